@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from pkgutil import resolve_name
 from typing import Annotated, Any
@@ -27,7 +27,7 @@ _JOBS = {
 """Commands by what they are for, the chief one first."""
 SCHEMAS = {
     "job": ("Job file of rotorid", "rotorid.files.job_keys:JobSettings"),
-    "rotor": ("Rotor file of rotorid", "rotorid.files.rotor:RotorFile"),
+    "rotor": ("Rotor file of rotorid", "rotorid.files.rotor_keys:RotorFile"),
     "small": ("Small model for motion of rotorid", "rotorid.files.small_model:SmallModelFile"),
     "study": ("Study file of rotorid", "rotorid.study.study_file:StudyKeys"),
     "waveforms": ("Waveforms file of rotorid", "rotorid.files.waveform_jobs:WaveformsFile"),
@@ -75,11 +75,10 @@ def schema(
     typer.echo(json_text(settings_schema(resolve_name(model), title)))
 
 
-def _work_of(name: str) -> Callable[..., Any]:
+def _work_of(name: str) -> Any:  # noqa: ANN401 - a function, with any arguments
     """The function of a command; its module is loaded here."""
     home = {"study": "rotorid.study", "fleet_fit": "rotorid.fleet"}
-    work: Callable[..., Any] = resolve_name(f"{home.get(name, f'rotorid.commands.{name}')}:{name}")
-    return work
+    return resolve_name(f"{home.get(name, f'rotorid.commands.{name}')}:{name}")
 
 
 def application(typed: Sequence[str] = ()) -> typer.Typer:

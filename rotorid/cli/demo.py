@@ -37,8 +37,9 @@ def demo(
     for number, words in enumerate(commands, start=1):
         with contextlib.redirect_stdout(io.StringIO()) as text:
             application(words)(words, prog_name="rotorid", standalone_mode=False)
-        typed = shlex.join(["rotorid", *words])
-        typer.echo("\n".join([f"{number}. {typed}", *text.getvalue().splitlines()[:6]]))
+        typer.echo(
+            "\n".join([f"{number}. {shlex.join(['rotorid', *words])}", *text.getvalue().splitlines()[:6]])
+        )
     typer.echo(f"Pictures: {', '.join(pictures)}\nAll that a command says: type it.")
 
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import os
 import re
-from typing import Any, get_type_hints
+from functools import partial
+from pathlib import Path
+from types import NoneType
+from typing import Any, get_args, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -23,6 +27,11 @@ class Commands(TyperGroup):
             ctx.fail(f"No such command {args[0]!r}: the command stands first, rotorid balance -- {args[0]}")
         return super().resolve_command(ctx, args)
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
+        """As typer's, without pydantic where that is not needed."""
+        _spare_pydantic(self, ctx)
+        return super().parse_args(ctx, args)
+
 
 class Command(TyperCommand):
     """A command whose help tells what its options choose from."""
@@ -35,11 +44,27 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401 - as typer declares it
         """As typer's, with the nearest choice in a complaint."""
+        _spare_pydantic(self, ctx)
         try:
             return super().parse_args(ctx, args)
         except typer.BadParameter as problem:
             problem.message = nearest_choice(problem.message)
             raise
+
+
+def _spare_pydantic(command: Any, ctx: Any) -> None:  # noqa: ANN401 - typer has no public type for it
+    """Leave to typer's checks only what needs one: they load pydantic, which takes long."""
+    hints = get_type_hints(command.callback)
+    for parameter in command.get_params(ctx):
+        hint = hints.get(parameter.name, NoneType)
+        parameter.process_value = partial(_taken, parameter.process_value, get_args(hint) or [hint])
+
+
+def _taken(check: Any, kinds: Any, ctx: Any, value: Any) -> Any:  # noqa: ANN401 - as typer declares it
+    """A value that is of one of these kinds, or names a file that can be read; else by typer's check."""
+    if isinstance(value, str) and Path in kinds and os.access(value, os.R_OK):
+        return Path(value)
+    return value if type(value) in kinds else check(ctx, value)
 
 
 def tell_choices(command: Any) -> None:  # noqa: ANN401 - typer has no public type for it

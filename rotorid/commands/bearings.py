@@ -171,12 +171,6 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
     )
     every = max(1, -(-(len(resting) - 1) // max(_ROWS // len(result.labels) - 1, 1)))
     table, warnings = result.table(), (*(f"the shaft rests on {stop}" for stop in touched), *films)
-    document = {
-        "speeds_rad_s": speeds,
-        "bearings": table.records,
-        "stability": stability and stability.to_dict(),
-        "warnings": warnings,
-    }
     return Outcome(
         result=result,
         sentences=(sentence(stability.sentence()) if stability else "One speed: no threshold is sought.",),
@@ -185,7 +179,14 @@ def bearings(rotor: Rotor | SmallModel | Path | str, options: BearingsOptions) -
         short=every > 1,
         file=table,
         files={".toml": result.linear_files},
-        keys=plain(document),
+        keys=plain(
+            {
+                "speeds_rad_s": speeds,
+                "bearings": table.records,
+                "stability": stability and stability.to_dict(),
+                "warnings": warnings,
+            }
+        ),
         pictures={"": result.figure},
         warnings=warnings,
     )

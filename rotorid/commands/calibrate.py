@@ -63,11 +63,12 @@ def outcome(calibrated: CalibratedRotor, origin: Mapping[str, Any]) -> Outcome:
     parameters = parameter_dict(names, every)
     for name, unknown, share in zip(names, calibrated.unknowns, calibrated.data_share, strict=True):
         parameters[name] |= {"path": unknown.path, "prior": unknown.prior, "data_share": share}
-    taken = counted(len(calibrated.exact), "number")
     notes = {
         calibrated.seen: bool(calibrated.seen),
         f"searched from {calibrated.searches} starting values": calibrated.searches > 1,
-        f"± count what {taken} taken as exact may be off": bool(calibrated.exact),
+        f"± count what {counted(len(calibrated.exact), 'number')} taken as exact may be off": bool(
+            calibrated.exact
+        ),
     }
     document = {
         "parameters": parameters,

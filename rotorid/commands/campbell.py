@@ -98,8 +98,11 @@ def campbell(rotor: Rotor | Path | str, options: CampbellOptions) -> Outcome:
     if operating:
         doubt = unsearched(speeds[0], speeds[-1], operating)
         doubt = doubt or ("the list may be cut, ask for more modes (-n)" if whirl.cut else "")
-        rows = whirl.to_dict()["damped_critical_speeds"]
-        peaks = [row["speed_rad_s"] for row in rows if not row["heavily_damped"]]
+        peaks = [
+            row["speed_rad_s"]
+            for row in whirl.to_dict()["damped_critical_speeds"]
+            if not row["heavily_damped"]
+        ]
         beside["operating"] = Separation(peaks, operating, doubt)
     sentences = [*whirl.sentence().splitlines()]
     if span:

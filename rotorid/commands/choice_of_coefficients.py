@@ -101,15 +101,14 @@ def of_planes(
     if job.groups.keys().isdisjoint(influence.planes):
         return coefficients
     of = unknowns(job.groups, influence.planes)
+    only = f"the trial weights were in {listing(map(repr, of.names), 'and')} only"
     if of.constrained and (lost := [name for name in names if name not in of.names]):
         raise ValueError(
-            f"the trial weights were in {listing(map(repr, of.names), 'and')} only, which does not tell what "
-            f"{lost[0]!r} would do: choose of these, or add trial runs"
+            f"{only}, which does not tell what {lost[0]!r} would do: choose of these, or add trial runs"
         )
     influence = mapped(influence, of.planes, of.inverse)
     if of.constrained:
-        words = f"the trial weights were in {listing(map(repr, of.names), 'and')} only"
-        words += ": what weights beside these do, such as the rounding of pieces, is not known"
+        words = f"{only}: what weights beside these do, such as the rounding of pieces, is not known"
         notes = (*influence.remarks.notes, words)
         influence = replace(influence, remarks=influence.remarks._replace(notes=notes))
     if job.check is not None and job.check.planes and influence.mounted.run == job.check.runs[-1]:
@@ -143,7 +142,7 @@ def _separate(trials: Trials) -> bool:
 
 def counted_before(job: Job) -> bool:
     """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
-    calibration = None if job.rotor is None else job.rotor.calibration
+    calibration = job.rotor and job.rotor.calibration
     job_and_runs = job.files[:2]  # the job, then its runs
     return calibration is not None and any(sha256(file) in calibration.data.values() for file in job_and_runs)
 
@@ -151,8 +150,9 @@ def counted_before(job: Job) -> bool:
 def needs_trial_run(job: Job, influence: Influence) -> bool:
     """Whether these coefficients are those of a model alone that contradicts its own data."""
     calibration = None if job.rotor is None else job.rotor.calibration
-    alone = influence is not job.influence and not job.trials.weights.any()
-    return calibration is not None and calibration.needs_trial_run and alone
+    if calibration is None or influence is job.influence or job.trials.weights.any():
+        return False
+    return calibration.needs_trial_run
 
 
 def as_measured(job: Job, influence: Influence) -> Influence:
@@ -203,7 +203,7 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
     if stations is not None:
         labels = replace(labels, weight_unit="g_mm", weight_scale=1e6)
     calibration = job.rotor.calibration
-    contradicted = calibration is not None and calibration.needs_trial_run
+    why = f"{NEEDS_TRIAL}: " if calibration and calibration.needs_trial_run else ""
     try:
         computed = model_influence(
             job.rotor,
@@ -217,11 +217,11 @@ def computed(job: Job, error_percent: float, stations: Mapping[str, int] | None 
             labels=labels,
         )
     except ValueError as problem:
-        raise UndeterminedError(f"{NEEDS_TRIAL}: {problem}") if contradicted else problem from None
+        raise UndeterminedError(f"{why}{problem}") if why else problem from None
     if calibration is None:
         return computed
     computed = calibrated(computed, job, places)
     warnings = computed.remarks.warnings
-    if contradicted:
-        warnings = *warnings, f"{NEEDS_TRIAL}: make a trial run, which is combined with it"
+    if why:
+        warnings = *warnings, f"{why}make a trial run, which is combined with it"
     return replace(computed, remarks=computed.remarks._replace(warnings=warnings))

@@ -121,10 +121,9 @@ class Destination:
         if self.json:
             typer.echo(json_text(document))
             return
-        written = [f"written: {printable(str(path))}" for path in built]
         answer = equations.answer(made.answer) if equations else made.answer
         text = answer.whole() if self.table else answer.brief(2 * LINES if equations else made.lines)
-        typer.echo("\n".join([text, *written]))
+        typer.echo("\n".join([text, *(f"written: {printable(str(path))}" for path in built)]))
 
 
 def check_targets(targets: Iterable[tuple[Path | None, Sequence[str]]]) -> None:
@@ -157,8 +156,12 @@ def check_inputs(targets: Iterable[Path], inputs: Iterable[Path]) -> None:
 
 def json_text(document: Mapping[str, Any]) -> str:
     """A document as JSON; in plain ASCII where standard output cannot write more."""
-    plain = "utf" not in (getattr(sys.stdout, "encoding", None) or "utf-8").casefold()
-    return json.dumps(document, ensure_ascii=plain, allow_nan=False, indent=1)
+    return json.dumps(
+        document,
+        ensure_ascii="utf" not in (getattr(sys.stdout, "encoding", None) or "utf-8").casefold(),
+        allow_nan=False,
+        indent=1,
+    )
 
 
 def figure_bytes(figure: Figure, path: Path) -> bytes:
@@ -187,8 +190,10 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     titles = {**panels, "Output": " ".join((*to, panels.get("Output", "")))}
     panel_of = {name: title for title, names in titles.items() for name in names.split()}
     first = [_argument(name, one, about[name], k) for k, (name, one) in enumerate(arguments.items())]
-    where = [one for one in _options(Destination, panel_of) if one.name in to]
-    options = [*_options(kind, panel_of), *where]
+    options = [
+        *_options(kind, panel_of),
+        *(one for one in _options(Destination, panel_of) if one.name in to),
+    ]
     order = ["", *panel_of]
     options.sort(key=lambda one: order.index(one.name if one.name in panel_of else ""))
 
@@ -232,9 +237,14 @@ def _options(kind: type, panel_of: Mapping[str, str]) -> Iterator[inspect.Parame
         alias = getattr(module, kind_of, str)
         taken = _TYPES.get(kind_of, alias if get_origin(alias) is Literal else str)
         default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
-        choices = getattr(module, "choices", None)
         yield _parameter(
-            name, about[name], taken, default, typer.Option, panel_of.get(name, "Input"), choices
+            name,
+            about[name],
+            taken,
+            default,
+            typer.Option,
+            panel_of.get(name, "Input"),
+            getattr(module, "choices", None),
         )
 
 
@@ -263,8 +273,9 @@ def _parameter(
 def _taken(kind: type, given: dict[str, Any]) -> Any:  # noqa: ANN401 - of that kind
     """The dataclass made of its fields among what typer has read; lists as tuples."""
     values = {field.name: given.pop(field.name, None) for field in dataclasses.fields(kind)}
-    stated = {name: value for name, value in values.items() if value is not None}
-    return kind(**{name: tuple(v) if isinstance(v, list) else v for name, v in stated.items()})
+    return kind(
+        **{name: tuple(v) if isinstance(v, list) else v for name, v in values.items() if v is not None}
+    )
 
 
 def written_help(of: Any) -> str:  # noqa: ANN401 - a function or a class

@@ -66,7 +66,6 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
         For a rotor or an option that cannot be.
     """
     import fem
-    from fem import critical_speeds_near
     from fem.parameters import band as error_band
     from rotorid.commands.operating_range import Separation, unsearched
 
@@ -81,7 +80,7 @@ def critical(rotor: Rotor | Path | str, options: CriticalOptions | None = None) 
     std, doubts = error_band(
         model,
         "the critical speeds",
-        lambda other: speeds if other is model else critical_speeds_near(other, speeds),
+        lambda other: speeds if other is model else fem.critical_speeds_near(other, speeds),
     )
     left_out += _stubby(model, modes)
     modes = dataclasses.replace(modes, std=std, warnings=(*modes.warnings, *left_out, *doubts))
@@ -114,14 +113,19 @@ def _pictures(
     from fem.plots import draw_modes, draw_speed_map
     from rotorid.base.plot_style import on_figure
 
-    pictures: dict[str, Callable[[], Figure]] = {}
-    if chart is not None:
-        caption = "Critical speeds over the stiffness of the supports."
-        pictures[caption] = lambda: on_figure(lambda ax: draw_speed_map(chart, ax, operating), height=5.0)
-    pictures["Mode shapes, each to its largest value 1, over the rotor."] = lambda: on_figure(
-        lambda ax: draw_modes(modes, ax)
-    )
-    return pictures
+    shapes = {
+        "Mode shapes, each to its largest value 1, over the rotor.": lambda: on_figure(
+            lambda ax: draw_modes(modes, ax)
+        )
+    }
+    if chart is None:
+        return shapes
+    return {
+        "Critical speeds over the stiffness of the supports.": lambda: on_figure(
+            lambda ax: draw_speed_map(chart, ax, operating), height=5.0
+        ),
+        **shapes,
+    }
 
 
 def _stubby(model: Rotor, modes: Modes) -> list[str]:
@@ -129,12 +133,13 @@ def _stubby(model: Rotor, modes: Modes) -> list[str]:
     import fem
 
     missing = [key for key in ("shear", "rotary_inertia") if not getattr(model.model, key)]
-    counted_in = dataclasses.replace(model.model, **dict.fromkeys(missing, True))
     discs = model.discs
     if "rotary_inertia" in missing:  # of discs it has a warning of its own
         discs = tuple(dataclasses.replace(disc, diametral_inertia=0.0) for disc in discs)
     with suppress(ValueError):  # none is left in the bearing tables
-        other = dataclasses.replace(model, model=counted_in, discs=discs)
+        other = dataclasses.replace(
+            model, model=dataclasses.replace(model.model, **dict.fromkeys(missing, True)), discs=discs
+        )
         full = fem.critical_speeds(other, modes.frequencies.size) if missing else modes
         high, low = (each.frequencies[each.frequencies > 0] for each in (modes, full))
         excess = max((100 * (f / g - 1) for f, g in zip(high, low, strict=False)), default=0.0)
@@ -164,7 +169,7 @@ def _map(model: Rotor, n: int) -> tuple[SpeedMap, list[str]]:
     chart = fem.speed_map(dataclasses.replace(model, supports=bearings), stiffness, n)
     left_out = {
         "seals": len(bearings) < len(model.supports),
-        "pedestals": any(bearing.pedestal is not None for bearing in bearings),
+        "pedestals": any(bearing.pedestal for bearing in bearings),
     }
     words = listing((name for name, there in left_out.items() if there), "and")
     return chart, [f"the map leaves out {words}"] if words else []

@@ -134,7 +134,8 @@ def cross_coupling(
 
 def mid_span(rotor: fem.Rotor) -> int:
     """The node next to the middle between the outer bearings."""
-    ends = [rotor.positions[each.node - 1] for each in rotor.supports if each.kind == "bearing"]
-    ends = ends or [rotor.positions[-1]]
+    ends = [rotor.positions[each.node - 1] for each in rotor.supports if each.kind == "bearing"] or [
+        rotor.positions[-1]
+    ]
     middle = (min(ends) + max(ends)) / 2 if ends[1:] else ends[0] / 2
-    return int(np.argmin(abs(rotor.positions - middle))) + 1
+    return int(abs(rotor.positions - middle).argmin()) + 1

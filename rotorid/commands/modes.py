@@ -127,10 +127,10 @@ def _read(file: Path, options: ModesOptions) -> tuple[Readings, ComplexArray]:
         speed_unit=table.axis.word.rpartition(", ")[2].replace("/", "_"),
     )
     shares = (errors.relative, errors.phase) if errors else None
-    readings = Readings(
-        "", None, table.frequencies, points, table.table(points), labels=labels, shares=shares
+    return (
+        Readings("", None, table.frequencies, points, table.table(points), labels=labels, shares=shares),
+        force * table.frequencies**power,
     )
-    return readings, force * table.frequencies**power
 
 
 def _sentence(fit: FittedModes) -> str:

@@ -34,12 +34,12 @@ def calibrated(influence: Influence, job: Job, places: ModelPlaces) -> Influence
     calibration = job.rotor.calibration
     assert calibration is not None
     W, dW = _derivatives(places.of_runs(_bare_run(influence), job.key_phasor), job.rotor)
-    L = calibration.columns()
-    columns = np.einsum("nscp,nm->mscp", dW, L)
-    lack = np.full(W.shape[:2], calibration.lack_of_fit)
+    columns = np.einsum("nscp,nm->mscp", dW, calibration.columns())
     none = Gaussian.none(*W.shape).noise
     errors = Gaussian(none.blocks[0], none.columns, influence.reading, run_errors(job.trials))
-    return with_parameters(replace(influence, W=W, errors=errors), columns, lack)
+    return with_parameters(
+        replace(influence, W=W, errors=errors), columns, np.full(W.shape[:2], calibration.lack_of_fit)
+    )
 
 
 def _bare_run(influence: Influence) -> Trials:

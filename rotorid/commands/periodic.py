@@ -142,8 +142,9 @@ def _points(branches: Sequence[Branch], labels: Sequence[str], along: Sequence[F
         Column("largest_multiplier", [abs(p.multipliers[0]) for _, _, p in each]),
     ]
     for k, label in enumerate(labels):
-        values = [size for sizes in along for size in sizes[:, k].tolist()]
-        columns.append(Column(f"amplitude_{label}_m", values))
+        columns.append(
+            Column(f"amplitude_{label}_m", [size for sizes in along for size in sizes[:, k].tolist()])
+        )
     return Table("branches", tuple(columns))
 
 

@@ -94,8 +94,10 @@ def state_space_bytes(small: SmallModel, speed: float, ending: str = ".json") ->
     if ending == ".mat":
         from scipy.io import savemat
 
-        named = {key: np.array(value, dtype=object) for key, value in document.items() if key in NAMED}
-        savemat(stream, arrays | named)
+        savemat(
+            stream,
+            arrays | {key: np.array(value, dtype=object) for key, value in document.items() if key in NAMED},
+        )
         # the text at the top, of 116 bytes, has the date of the clock
         head = f"MATLAB 5.0 MAT-file, written by rotorid, {now():%Y-%m-%d %H:%M:%S} UTC"
         return head.encode().ljust(116) + stream.getvalue()[116:]

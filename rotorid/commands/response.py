@@ -146,7 +146,7 @@ class Vibration:
         there = self.finer.steady & (self.finer.speeds >= low) & (self.finer.speeds <= high)
         if not there.any():
             return {}
-        largest = 2 * float(np.abs(self.finer.readings(self.sensors)[there]).max())
+        largest = 2 * float(abs(self.finer.readings(self.sensors)[there]).max())
         return {
             "speed_rad_s": high,
             "allowed_peak_to_peak_m": fem.api617_limit(high),
@@ -184,8 +184,6 @@ class Vibration:
 
     def file(self) -> Table:
         """One row per speed and sensor."""
-        import numpy as np
-
         from rotorid.base.text import phase_deg
 
         Z = self.response.readings(self.sensors)
@@ -194,7 +192,7 @@ class Vibration:
         columns = (
             Column("speed_rad_s", self.response.speeds.repeat(C)),
             Column("sensor", self.labels * S),
-            Column("amplitude_m", np.abs(Z).ravel()),
+            Column("amplitude_m", abs(Z).ravel()),
             Column("phase_deg", phase_deg(Z).ravel()),
             *std,
         )
@@ -468,8 +466,9 @@ def _solved(
     if isinstance(model, fem.Rotor):
 
         def amplitudes(other: Rotor) -> FloatArray:
-            new = other is not model
-            again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=kept) if new else finer
+            again = finer
+            if other is not model:
+                again = fem.unbalance_response(other, unbalance, finer.speeds, nodes=kept)
             return np.abs(again.readings(places))
 
         std, doubts = error_band(model, "the amplitudes", amplitudes)

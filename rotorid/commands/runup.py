@@ -176,7 +176,7 @@ def _hasty(fit: FittedModes) -> list[str]:
     if not isinstance(fit.answers, SweptAnswers):
         return []
     omega, zeta = fit.values[:2]
-    rate = np.abs(fit.answers.speed.derivative()(fit.answers.at(omega).time))
+    rate = abs(fit.answers.speed.derivative()(fit.answers.at(omega).time))
     turns = zeta * omega**2 / np.pi / np.maximum(rate, 1e-12)  # 2ζω / rate seconds of ω / 2π turns
     return [
         f"mode {mode + 1} is passed within {turns[mode]:.2g} turns of its half-power band: vectors, means "

@@ -116,10 +116,9 @@ def split(vector: Vector, options: SplitOptions | None = None) -> Outcome:
     radius = None if options.radius is None else size(options.radius, "--radius")
     how = {"holes": _in_holes, "two": _at_two_angles, "drill": _drilled}.get(ways[0])
     placed = how(target, labels, radius, options) if how else _in_planes(each, options)
-    below = placed.lines(labels) if isinstance(placed, Split) else []
     return Outcome(
         result=placed,
-        sentences=(placed.sentence(labels), *below),
+        sentences=(placed.sentence(labels), *(placed.lines(labels) if isinstance(placed, Split) else ())),
         file="there is no table of one weight: see to_dict()",
         keys=placed.to_dict(labels),
         pictures={"": lambda: _figure(placed, labels, target)},

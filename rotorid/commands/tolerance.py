@@ -67,8 +67,11 @@ def tolerance(options: ToleranceOptions) -> Outcome:
     from rotorid.base.plot_style import on_figure
 
     result = permissible(options)
-    pictures = {"Permissible unbalance.": lambda: on_figure(lambda ax: draw_tolerance(result, ax))}
-    return outcome_of(result, pictures=pictures, title="Tolerance")
+    return outcome_of(
+        result,
+        pictures={"Permissible unbalance.": lambda: on_figure(lambda ax: draw_tolerance(result, ax))},
+        title="Tolerance",
+    )
 
 
 def permissible(options: ToleranceOptions, names: tuple[str, str] = ("--mass", "--speed")) -> Tolerance:

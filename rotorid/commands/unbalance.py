@@ -94,7 +94,10 @@ def unbalance(job: Job | Path | str, options: UnbalanceOptions) -> Outcome:
     places = {str(node): rotor.node(node) for node in asked}
     if len(set(places.values())) < len(asked):
         raise ValueError(f"--stations {options.stations!r}: every station may stand only once")
-    influence = computed(read, 0.0, places)
-    result = unbalance_of_run(influence, read.trials)
-    pictures = {"Unbalance along the rotor.": lambda: unbalance_figure(result, rotor)}
-    return outcome_of(result, provenance(read.files, options), pictures=pictures, title="Unbalance")
+    result = unbalance_of_run(computed(read, 0.0, places), read.trials)
+    return outcome_of(
+        result,
+        provenance(read.files, options),
+        pictures={"Unbalance along the rotor.": lambda: unbalance_figure(result, rotor)},
+        title="Unbalance",
+    )

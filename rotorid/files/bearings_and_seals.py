@@ -18,7 +18,7 @@ from rotorid.base.choices import did_you_mean, find
 from rotorid.base.tables import csv_bytes
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.columns import Column, Table, read_table
+from rotorid.files.columns import OUTWARDS, Column, Table, read_table
 from rotorid.files.input_problems import InputError, Problems
 from rotorid.files.settings import NotNegative, Number, Positive, Settings, Text, key, listed, optional
 from rotorid.files.units import one_of
@@ -26,7 +26,6 @@ from rotorid.files.units import one_of
 T = TypeVar("T")
 S = TypeVar("S", bound=Settings)
 _NODE = "a node: its number from 1, or the name of a station"
-OUTWARDS = "a finite number, 0 or more; what pushes outwards, or drives, is a [[seal]], not a [[bearing]]"
 ENTRIES = {"stiffness": ("kxx", "kxy", "kyx", "kyy"), "damping": ("cxx", "cxy", "cyx", "cyy")}
 """Entries of the matrix of a quantity."""
 _DIAGONAL = (*ENTRIES, "kxx", "kyy", "cxx", "cyy")

@@ -133,7 +133,7 @@ def subtract_slow_roll(trials: Trials, vectors: ComplexArray) -> Trials:
     """Readings less the slow-roll vectors, (C,) or (S, C), with honest errors."""
     left, errors = trials.with_phases().readings - vectors, trials.errors
     if errors is not None:
-        share = max(errors.amplitude, errors.phase) * float(np.abs(vectors).max(initial=0.0))
+        share = max(errors.amplitude, errors.phase) * float(abs(vectors).max(initial=0.0))
         errors = replace(errors, floor=float(np.hypot(errors.floor, share)))
     steps = None if trials.steps is None else _turned(trials.steps, trials.readings, left)
     return replace(trials, readings=left, errors=errors, steps=steps)
@@ -144,10 +144,10 @@ def _turned(steps: FloatArray, measured: ComplexArray, left: ComplexArray) -> Fl
 
     The measured amplitude was rounded in its own direction, the phase across; what is left points elsewhere.
     """
-    amplitude, phase = steps[0] ** 2, (steps[1] * np.abs(measured)) ** 2
+    amplitude, phase = steps[0] ** 2, (steps[1] * abs(measured)) ** 2
     cos = np.cos(np.angle(left) - np.angle(measured)) ** 2
     along, across = cos * amplitude + (1 - cos) * phase, (1 - cos) * amplitude + cos * phase
-    size = np.maximum(np.abs(left), 1e-12 * np.abs(measured)) + np.finfo(float).tiny
+    size = np.maximum(abs(left), 1e-12 * abs(measured)) + np.finfo(float).tiny
     return np.array([np.sqrt(along), np.sqrt(across) / size])
 
 

@@ -42,6 +42,7 @@ _SURE = 15
 """A float shows so many digits truly; more, as in 0.30000000000000004, are those of a computation."""
 TEXT, UNCLEAR = Unit("", "text"), Unit("?", "unclear")
 """Of a column of names, and of one whose unit is none."""
+OUTWARDS = "a finite number, 0 or more; what pushes outwards, or drives, is a [[seal]], not a [[bearing]]"
 FULL_TURN = 2.0 * np.pi * (1.0 + 1e-12)
 Source = str | Path | Grid | tuple[Path, ...]
 """A table: a file, the cells of a sheet, or files: of runs with one run each, of weights that add."""

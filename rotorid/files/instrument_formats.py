@@ -124,12 +124,12 @@ def _rate(path: Path, clock: str, times: AnyArray, first_row: int) -> float:
     unit = time_unit(clock) or TIME["s"]
     number = np.arange(len(times)) - (len(times) - 1) / 2
     step = float(number @ times / (number @ number))
-    off = np.abs(times - np.mean(times) - step * number)
+    off = abs(times - times.mean() - step * number)
     if step > 0 and (off <= LARGEST_SHIFT * step).all():
         return 1.0 / unit.to_si(step)
     usual = float(np.nanmedian(np.diff(times)))
-    even = np.abs(times - times[0] - usual * np.arange(len(times))) <= LARGEST_SHIFT * abs(usual)
-    at = int(np.argmin(even))
+    even = abs(times - times[0] - usual * np.arange(len(times))) <= LARGEST_SHIFT * abs(usual)
+    at = int(even.argmin())
     expected = f"times in even steps, {usual:.6g} {unit.name} here, or no such column and a stated rate"
     value = "" if np.isnan(times[at]) else f"{times[at]:.9g}"
     raise refusal(path, expected, at + first_row, clock, value)

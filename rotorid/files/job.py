@@ -395,9 +395,14 @@ def _readings(
     if source is not None and influence and trials:
         groups = settings.shares(conventions.labels)
         trials = in_planes(trials, groups)
-        tolerance = conventions.speed_tolerance_percent
-        planes = unknowns(groups, influence.planes).planes
-        influence = fit_to_readings(influence, trials, planes, tolerance, source_name(source), problems)
+        influence = fit_to_readings(
+            influence,
+            trials,
+            unknowns(groups, influence.planes).planes,
+            conventions.speed_tolerance_percent,
+            source_name(source),
+            problems,
+        )
     if not trials or len(problems) > before:
         return None
     labels, its = conventions.labels, (influence or trials).labels

@@ -274,8 +274,8 @@ def with_taken(
     for plane, free in holes.items():
         here = [row for row in rows if row[:2] == (check.runs[-1], plane)]
         mounted = np.array([row[2] for row in here])
-        size, holes_at = np.abs(mounted), np.exp(1j * free.angles)
-        off = np.abs(mounted[:, None] - size[:, None] * holes_at)
+        size, holes_at = abs(mounted), np.exp(1j * free.angles)
+        off = abs(mounted[:, None] - size[:, None] * holes_at)
         taken: FloatArray = np.bincount(off.argmin(axis=1), size, len(holes_at)).astype(float)
         in_holes = (off.min(axis=1) <= IN_HOLE * size).all()
         if in_holes and taken.any() and not taken.all():

@@ -90,7 +90,7 @@ def read_measurements(path: str | Path, model: HarmonicModel | HarmonicFile) -> 
         free &= rows.signals[name] == 0
     excited = f"0, or an amplitude of {listing(model.inputs)} that excites this row: {_FREE}"
     for name in measured:
-        unlike = free & (np.abs(rows.signals[name].imag) > 0)
+        unlike = free & (abs(rows.signals[name].imag) > 0)
         table.complain_where(unlike, _stems(table, name)[-1], excited)
     problems.stop()
     if lacking := {*model.outputs} - {*measured} - unmeasured:
@@ -129,7 +129,7 @@ def read_amplitudes(path: str | Path) -> Experiments:
     signals, shown = {**rows.signals}, {**rows.units}
     for name, z in rows.signals.items():
         size = _stems(table, name)[0]
-        bad = (rows.frequencies == 0) | ((name == "F") & ~(np.abs(z) > 0))
+        bad = (rows.frequencies == 0) | ((name == "F") & ~(abs(z) > 0))
         table.complain_where(bad, size, "a frequency above 0, and a force F that is not 0")
         if not np.nan_to_num(z).any():
             table.as_whole(size, "a number that is not 0 in at least one row")
@@ -279,7 +279,7 @@ def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[s
         if stems and not (rows.free.all() and (z == 1).all()):
             spread = np.stack([table.steps(stems[0]), table.steps(stems[-1])]) / np.sqrt(12.0)
             if stems[0] == f"{name}_amplitude":
-                turn, spread[1] = np.exp(1j * np.angle(z)), spread[1] * np.abs(z)
+                turn, spread[1] = np.exp(1j * np.angle(z)), spread[1] * abs(z)
         root = real_matrices(turn) * spread.T[:, None]
         covariances[name] = root @ np.swapaxes(root, 1, 2)
     steps = table.steps("frequency" if "frequency" in table else "speed")

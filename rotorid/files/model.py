@@ -276,8 +276,9 @@ def read_harmonic_model(path: str | Path) -> HarmonicFile:
         guesses = {name: value for name, value in estimate.items() if value is not None}
         errors = None
         if given := file.errors:
-            phase = math.radians(given.phase_deg)
-            errors = AmplitudeErrors(given.amplitude_percent / 100, phase, given.floor)
+            errors = AmplitudeErrors(
+                given.amplitude_percent / 100, math.radians(given.phase_deg), given.floor
+            )
         unmeasured = tuple({*model.outputs} - {*file.outputs} if file.outputs else ())
         return HarmonicFile(model, bounds, guesses | start, errors, unmeasured, prior)
 

@@ -75,8 +75,7 @@ def read_unbalance(path: str | Path, rotor: Rotor | SmallModel) -> dict[int, com
     InputError
         With all problems of the file.
     """
-    problems = Problems()
-    table = read_table(path, "unbalance", UNBALANCE_COLUMNS, problems)
+    table = read_table(path, "unbalance", UNBALANCE_COLUMNS, Problems())
     sizes = {"unbalance", "mass", "radius"}
     present = sizes & {*table.fields}
     if present not in ({"unbalance"}, {"mass", "radius"}) and table.misspelt.isdisjoint(sizes):
@@ -207,7 +206,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
     for name in {stem, "frequency_std"} & {*table.fields}:
         cells = table.numbers(name)
         table.complain_where(first & np.isnan(cells), name, "a number in the first row of a mode")
-        other = np.abs(cells - cells[heads][of]) > 1e-9 * cells
+        other = abs(cells - cells[heads][of]) > 1e-9 * cells
         table.complain_where(other, name, "what stands in the first row of the mode, or a blank")
     falling = first & (np.diff(values[heads], prepend=0.0) <= 0)[of]
     expected = "a frequency above that of the mode before: modes are numbered from the lowest"
@@ -228,7 +227,7 @@ def read_modes(path: str | Path, rotor: Rotor | None = None) -> MeasuredModes:
         if lost.any():
             names = listing((str(distinct[k]) for k in np.flatnonzero(lost)), "and")
             table.complain(head, "mode", f"the same nodes in every mode; it lacks {names}")
-    still = first & ~np.take(shapes.any(axis=0), of)
+    still = first & ~shapes[:, of].any(axis=0)
     table.complain_where(still, "shape", "a shape that is not 0 at every node of its mode")
     problems.stop()
     return MeasuredModes(
@@ -282,7 +281,7 @@ def read_compliance(
     one = np.full((len(order), len(order)), np.nan)
     one[p, q] = values
     one, other = np.where(np.isnan(one), one.T, one), np.where(np.isnan(one.T), one, one.T)
-    differs = np.abs(one - other) > RECIPROCAL * np.maximum(np.abs(one), np.abs(other))
+    differs = abs(one - other) > RECIPROCAL * np.maximum(abs(one), abs(other))
     expected = (
         f"that of the same nodes exchanged to {100 * RECIPROCAL:g} %: a force at one of them moves the other "
         "as much as the other way round"

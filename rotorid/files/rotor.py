@@ -3,59 +3,20 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
-from pydantic import Field
 
-from fem import (
-    STEEL_DENSITY,
-    STEEL_MODULUS,
-    STEEL_POISSON,
-    Calibration,
-    Disc,
-    Model,
-    Rotor,
-    Support,
-)
-from fem.parameters import expand
+from fem import Disc, Model, Rotor, Support
 from rotorid.base.arrays import FloatArray
 from rotorid.base.tables import csv_bytes
-from rotorid.base.text import counted
 from rotorid.files import units
-from rotorid.files.bearings_and_seals import (
-    OUTWARDS,
-    Attached,
-    Place,
-    each,
-    force_tables,
-    in_si,
-    places,
-    read_attached,
-    support_tables,
-    whole,
-)
-from rotorid.files.columns import Column, read_table
+from rotorid.files.columns import OUTWARDS, Column, read_table
 from rotorid.files.disk import each_file_once, write_files
 from rotorid.files.input_problems import InputError, Problems, TableWarning, refusal
-from rotorid.files.settings import (
-    NotNegative,
-    Number,
-    Positive,
-    Settings,
-    Text,
-    key,
-    listed,
-    optional,
-    read_settings,
-    read_toml,
-    toml_bytes,
-    unwritten,
-)
 from rotorid.files.units import one_of
 
 USUAL = {
@@ -67,131 +28,14 @@ USUAL = {
 """From where to where quantities of machines are, in SI, and units in which they may have been meant."""
 
 
-class Material(Settings):
-    """What a shaft is made of where its table does not say."""
-
-    youngs_modulus: Positive = key("Young's modulus", "youngs_modulus_Pa", STEEL_MODULUS, units=units.MODULUS)
-    density: NotNegative = key("density", "density_kg_per_m3", STEEL_DENSITY, units=units.DENSITY)
-    poisson_ratio: Annotated[Number, Field(gt=-1, le=0.5)] = key(
-        "Poisson's ratio; where it is given, shear is counted unless `[model] shear = false`",
-        default=STEEL_POISSON,
-    )
-    material_damping: NotNegative = key(
-        "loss per stress rate: the stress is E (ε + τ dε/dt)", "material_damping_s", 0.0, units=units.TIME
-    )
-
-
-class Effects(Settings):
-    """What the elements take into account."""
-
-    shear: bool = key("shear deformation (Timoshenko)", default=False)
-    rotary_inertia: bool = key("inertia of tilting sections and discs", default=False)
-    gyroscopic: bool = key("gyroscopic moments of shaft and discs", default=False)
-
-
-class Station(Place):
-    """A name for a node."""
-
-    name: Text = key("the name, which stands wherever a node may", expected="a name for the node")
-
-    def wrong(self) -> Iterator[tuple[str, str]]:
-        """A name that means something else."""
-        if self.name.isdecimal() or {":", ","} & {*self.name}:
-            yield (
-                "name",
-                "a name, not a number, without ':' and ',', which separate names on the command line",
-            )
-
-
-class DiscKeys(Place):
-    """A disc by its mass, or by its geometry."""
-
-    mass: NotNegative | None = optional("mass; with moments of inertia or alone", "mass_kg", units=units.MASS)
-    polar_inertia: NotNegative | None = optional(
-        "about the shaft's line", "polar_inertia_kg_m2", units=units.INERTIA
-    )
-    diametral_inertia: NotNegative | None = optional(
-        "across it", "diametral_inertia_kg_m2", units=units.INERTIA
-    )
-    width: Positive | None = optional(
-        "of a disc by geometry, with `outer_diameter_m`", "width_m", units=units.LENGTH
-    )
-    outer_diameter: Positive | None = optional(
-        "of a disc by geometry", "outer_diameter_m", units=units.LENGTH
-    )
-    inner_diameter: NotNegative | None = optional(
-        "bore of a disc by geometry; default: none", "inner_diameter_m", units=units.LENGTH
-    )
-    density: NotNegative | None = optional(
-        "of a disc by geometry; default: the material's", "density_kg_per_m3", units=units.DENSITY
-    )
-
-    def wrong(self) -> Iterator[tuple[str, str]]:
-        """Neither of both, or some of both."""
-        both = {"width", "outer_diameter"}
-        sizes = self.model_fields_set & {*both, "inner_diameter", "density"}
-        if bool(sizes) == self.has("mass"):
-            yield "mass", "either the mass of the disc or its geometry: width_m, outer_diameter_m"
-        elif sizes and (self.has("polar_inertia") or self.has("diametral_inertia") or not both <= sizes):
-            yield "width", "the disc's width and outer diameter, and no moments of inertia beside them"
-
-    def made(self, node: int, density: float) -> Disc:
-        """The disc at a node, of the material's density."""
-        values = self.model_dump(exclude_none=True) | {"node": node}
-        return Disc(**values) if self.has("mass") else Disc.from_geometry(**{"density": density} | values)
-
-
-class Parameter(Settings):
-    """A number of a rotor that was fitted."""
-
-    name: Text = key("which of the rotor's numbers, such as `bearing[1].kxx.scale`", expected="its name")
-    value: Number = key("what was found, in SI; a scale of the file calibrated", expected="its value")
-    std: NotNegative = key(
-        "standard deviation; of a scale relative to this file", expected="its std, 0 or more"
-    )
-    correlation: listed(Number) = key(  # type: ignore[valid-type]
-        "with all parameters in their order; default: with none", default=()
-    )
-
-
-class DataFile(Settings):
-    """A file of readings."""
-
-    file: Text = key("name of a file that it was made from", expected="its name")
-    sha256: Text = key("hash of its content", expected="its hash")
-
-
-class CalibrationKeys(Settings):
-    """What a fit to readings found."""
-
-    needs_trial_run: bool = key("whether the data contradict the model", default=False)
-    lack_of_fit: NotNegative = key(
-        "what the model leaves of a coefficient, one relative standard deviation", default=0.0
-    )
-    parameter: list[Parameter] = key("what was fitted", default=[])
-    data: list[DataFile] = key("a file that it was made from, which must not count twice", default=[])
-
-
-class RotorFile(Attached):  # type: ignore[misc, valid-type]
-    """A rotor file."""
-
-    shaft: Text = key(
-        "the rotor table, relative to this file; required",
-        expected='the file of the shaft, shaft = "shaft.csv"',
-    )
-    material: Material = key("of elements whose row says nothing", default=Material.model_construct())
-    model: Effects = key(
-        "effects that count, true or false; an inertia that is thereby ignored gives a warning",
-        default=Effects.model_construct(),
-    )
-    disc: list[DiscKeys] = key("a disc, as many as there are", default=[])
-    station: list[Station] = key("a name for a node", default=[])
-    calibration: CalibrationKeys | None = optional("what a fit to readings found, with its errors")
-
-
 def _column(stem: str, of: dict[str, units.Unit], *usual: str) -> Column:
-    names = tuple(f"{stem}_{unit}" for unit in usual)
-    return Column(stem, one_of(of), names, required=len(usual) > 1, blank=stem != "length")
+    return Column(
+        stem,
+        one_of(of),
+        tuple(f"{stem}_{unit}" for unit in usual),
+        required=len(usual) > 1,
+        blank=stem != "length",
+    )
 
 
 OF_ELEMENTS = {
@@ -237,39 +81,17 @@ def read_rotor(path: str | Path) -> Rotor:
     TableWarning
         About a guessed encoding, and sizes and materials that seem to be in another unit.
     """
-    path, problems = Path(path), Problems()
-    file, shaft, stations = unwritten(RotorFile, str(path)), path, dict[str, int]()
+    path = Path(path)
     if path.suffix.lower() == ".toml":
-        from rotorid.files.small_model import is_small
+        from rotorid.files.rotor_keys import completed, read_keys
 
-        data = read_toml(path)
-        if is_small(data):
-            expected = "a rotor file; this is a small model, for `rotorid motion`, `response`, `fit` and such"
-            raise refusal(path, expected, column="shaft")
-        file = read_settings(RotorFile, data, str(path))
-        shaft = path.parent / file.shaft
-    parts = _shaft(shaft, file.material)
-    at = places(range(1, len(parts["length"]) + 2), stations)
-
-    def name(item: Station) -> None:
-        if item.name in stations:
-            raise InputError([item.problem("name", "a name that no other station has")])
-        stations[item.name] = at(item)
-
-    each(problems, file.station, "station", name)
-    density = file.material.density
-    parts["discs"] += each(problems, file.disc, "disc", lambda item: item.made(at(item), density))
-    attached = read_attached(file, at, path.parent, problems)
-    problems.stop()
-    parts |= {"forces": attached["forces"], "supports": parts["supports"] + attached["supports"]}
-    effects, has_ratio = file.model.model_dump(), parts.pop("has_ratio") or file.material.has("poisson_ratio")
-    if not file.model.has("shear"):  # nothing else depends on the ratio
-        effects["shear"] = has_ratio
-    rotor = whole(file, "rotor", lambda _: Rotor(**parts, stations=stations, model=Model(**effects)))
-    if file.calibration:
-        calibration = whole(file.calibration, "calibration", lambda keys: _calibration(keys, rotor))
-        return replace(rotor, calibration=calibration)
-    return rotor
+        file = read_keys(path)
+        return completed(*_shaft(path.parent / file.shaft, file.material), file, path.parent)
+    parts, has_ratio = _shaft(path, Rotor)
+    try:
+        return Rotor(**parts, model=Model(has_ratio))
+    except ValueError as error:
+        raise refusal(path, f"a possible rotor: {error}") from None
 
 
 def rotor_files(path: str | Path) -> tuple[Path, ...]:
@@ -293,8 +115,11 @@ def rotor_files(path: str | Path) -> tuple[Path, ...]:
     return tuple(asked)
 
 
-def _shaft(path: Path, material: Material) -> dict[str, Any]:
-    """What a rotor table says, by the attributes of a rotor."""
+def _shaft(path: Path, material: Any) -> tuple[dict[str, Any], bool]:  # noqa: ANN401 - any with these names
+    """What a rotor table says, by the attributes of a rotor, and whether it has Poisson's ratios.
+
+    What it does not say is as in the `material`, a `Material` or `Rotor` with its defaults.
+    """
     problems, doubts = Problems(), Problems()
     table = read_table(path, "rotor", COLUMNS, problems)
     values: dict[str, FloatArray] = {}
@@ -335,28 +160,7 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
         **{name: values[column.stem][elements] for name, column in OF_ELEMENTS.items()},
         "discs": [Disc(node, *row[:3]) for node, row in enumerate(rows, 1) if any(row[:3])],
         "supports": [Support(node, *row[3:]) for node, row in enumerate(rows, 1) if any(row[3:])],
-        "has_ratio": "poisson_ratio" in table,
-    }
-
-
-def _calibration(file: CalibrationKeys, rotor: Rotor) -> Calibration:
-    """ValueError for what is none of this rotor."""
-    parameters, n = file.parameter, len(file.parameter)
-    for one in parameters:
-        if expand(rotor, one.name) != (one.name,):
-            raise ValueError(f"{one.name} is not a single parameter: name one, without [*]")
-        if len(one.correlation) not in (0, n):
-            raise ValueError(f"{one.name}: correlation needs {counted(n, 'number')}, one for each parameter")
-    std = np.array([one.std for one in parameters])
-    R = [one.correlation or row for one, row in zip(parameters, np.eye(n), strict=True)]
-    return Calibration(
-        tuple(one.name for one in parameters),
-        np.array([one.value for one in parameters]),
-        np.reshape(R, (n, n)) * np.outer(std, std),
-        file.lack_of_fit,
-        file.needs_trial_run,
-        {one.file: one.sha256 for one in file.data},
-    )
+    }, "poisson_ratio" in table
 
 
 def write_rotor(path: str | Path, rotor: Rotor) -> tuple[Path, ...]:
@@ -397,8 +201,10 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     beside, why = path.parent / ".written", ""
     try:
         files = _files(path, rotor)
-        copies = {beside / file.name: data for file, data in files.items()}
-        with each_file_once(copies), warnings.catch_warnings():
+        with (
+            each_file_once({beside / file.name: data for file, data in files.items()}),
+            warnings.catch_warnings(),
+        ):
             warnings.simplefilter("ignore")
             if read_rotor(beside / path.name) == rotor:
                 return files
@@ -408,6 +214,10 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
 
 
 def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
+    from rotorid.files.bearings_and_seals import force_tables, in_si, support_tables
+    from rotorid.files.rotor_keys import DiscKeys, Material, calibration_tables
+    from rotorid.files.settings import toml_bytes
+
     shaft, material = path.with_name(f"{path.stem}_shaft.csv"), dict[str, float]()
     columns: dict[str, list[Any]] = {"element": [str(i + 1) for i in range(rotor.n_elements)]}
     for name, column in OF_ELEMENTS.items():
@@ -425,21 +235,10 @@ def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
         **supports,
         **force_tables(rotor.forces),
         "station": [{"name": name, "node": node} for name, node in rotor.stations.items()],
-        "calibration": _calibration_tables(rotor.calibration) if rotor.calibration else {},
+        "calibration": calibration_tables(rotor.calibration) if rotor.calibration else {},
     }
     return {
         shaft: csv_bytes([*columns], [*zip(*columns.values(), strict=True)]),
         **tables,
         path: toml_bytes({name: part for name, part in document.items() if part}),
-    }
-
-
-def _calibration_tables(calibration: Calibration) -> dict[str, Any]:
-    arrays = calibration.values, calibration.std, calibration.correlation
-    rows = zip(calibration.names, *(array.tolist() for array in arrays), strict=True)
-    return {
-        "needs_trial_run": calibration.needs_trial_run,
-        "lack_of_fit": calibration.lack_of_fit,
-        "parameter": [dict(zip(Parameter.model_fields, row, strict=True)) for row in rows],
-        "data": [{"file": name, "sha256": value} for name, value in calibration.data.items()],
     }

@@ -72,7 +72,7 @@ def same_speed(a: float, b: float, tolerance_percent: float) -> bool:
 
 def nearest_speed(speeds: FloatArray, speed: float, tolerance_percent: float) -> int | None:
     """Which of some speeds counts as one with this one; None: none of them does."""
-    near = int(np.argmin(np.abs(speeds - speed)))
+    near = int(abs(speeds - speed).argmin())
     return near if same_speed(float(speeds[near]), speed, tolerance_percent) else None
 
 
@@ -127,8 +127,9 @@ def read_trials(
     """
     problems = Problems()
     phase = phase or stated_phase(runs)
-    labels = Labels(phase=phase or "lead", angles=angles or "with rotation")
-    conventions = Conventions(labels, speed_tolerance_percent)
+    conventions = Conventions(
+        Labels(phase=phase or "lead", angles=angles or "with rotation"), speed_tolerance_percent
+    )
     trials = problems.need(make_trials(runs, weights, conventions, errors, problems))
     assumed: tuple[str, ...] = ("phase",) if phase is None else ()
     if angles is None and trials.weights.imag.any():
@@ -147,8 +148,10 @@ def make_trials(
 ) -> Trials | None:
     """Put both tables together, or None and problems."""
     names, trials = read_runs(runs, conventions, problems)
-    nameless = replace(conventions, run="")  # the only run need not be named
-    mounted = None if weights is None else read_weights(weights, names, nameless, problems)
+    # the only run need not be named
+    mounted = (
+        None if weights is None else read_weights(weights, names, replace(conventions, run=""), problems)
+    )
     if not trials or problems:
         return None
     if isinstance(errors, ReadingErrors):
@@ -319,7 +322,7 @@ def covariances(table: Table, vectors: ComplexArray) -> FloatArray:
     ndarray
         Shape (n, 2, 2); where there is no amplitude, no direction is another.
     """
-    along, size = table.numbers("amplitude_std"), np.abs(vectors)
+    along, size = table.numbers("amplitude_std"), abs(vectors)
     across = np.where(size > 0, size * table.numbers("phase_std"), along)
     return turned(vectors, along**2, across**2)
 
@@ -364,8 +367,8 @@ def _ask_about_exchange(table: Table, conventions: Conventions) -> None:
     if conventions.exchanged is not None or table.unit("phase").name != "deg" or len(table) < 4:
         return
     amplitude = table.numbers("amplitude") * table.unit("amplitude").scale
-    small = np.abs(table.numbers("phase")).max() < np.radians(30) and table.steps("phase").min() < 0.008
-    whole = np.all((np.abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
+    small = abs(table.numbers("phase")).max() < np.radians(30) and table.steps("phase").min() < 0.008
+    whole = np.all((abs(amplitude - np.round(amplitude)) < 1e-9) & (amplitude <= 360))
     if small and whole and np.ptp(amplitude) > 90:
         expected = (
             "amplitudes and phases in their own columns: are they exchanged? All phases are below 30°, all "

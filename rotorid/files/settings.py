@@ -353,13 +353,6 @@ def read_settings(
         raise InputError(error.errors(include_url=False)[0]["ctx"]["error"].args) from None
 
 
-def unwritten(model: type[_Model], source: str) -> _Model:
-    """Settings of which nothing is written, without what reading some would take."""
-    made = model.model_construct()
-    made._table = _Table(source)
-    return made
-
-
 def _plain(value: object) -> object:
     """A number, also as its text."""
     if isinstance(value, str):

@@ -148,8 +148,7 @@ def _read(path: Path) -> tuple[SmallModel, dict[str, Any]]:
     parts["unbalance"] = dict.fromkeys(dict(unbalance), 0j)
     for node, value in unbalance:
         parts["unbalance"][node] += value
-    model = whole(file, "small model", lambda _: SmallModel(**parts, bow=dict(bow)))
-    return model, {**file.equations}
+    return whole(file, "small model", lambda _: SmallModel(**parts, bow=dict(bow))), {**file.equations}
 
 
 def linear_equations(model: SmallModel, speed: float, both_planes: bool) -> Motion:
@@ -254,8 +253,7 @@ def small_model_files(
         "bow": _vectors(BowKeys, model.bow),
         "equations": equations,
     }
-    written = toml_bytes({name: part for name, part in data.items() if part}, comments)
-    return {**files, path: written}
+    return {**files, path: toml_bytes({name: part for name, part in data.items() if part}, comments)}
 
 
 def _vectors(keys: type[UnbalanceKeys], by_node: Mapping[int, complex]) -> list[dict[str, Any]]:

@@ -241,8 +241,12 @@ def _record(
         sensors.append(Channel(name, samples, factor, DERIVATIVE.get(unit.kind), signal_path))
     if not sensors:
         raise refusal(path, "a channel besides that of the tacho")
-    tacho = Channel(marks, pulses * np.float32(sampled.scale))
-    return WaveformRecord(run, str(path), rate, tacho, tuple(sensors)), amplitude
+    return (
+        WaveformRecord(
+            run, str(path), rate, Channel(marks, pulses * np.float32(sampled.scale)), tuple(sensors)
+        ),
+        amplitude,
+    )
 
 
 def _parted(name: str) -> tuple[str, Unit | None]:
@@ -291,7 +295,7 @@ def vectors_table(each: Sequence[Vectors], labels: Labels) -> Table:
         name, about = ("", unit.replace("_", " ")) if order == 1 else (f"order{order}_", f"{order}×")
         vectors = whole.vectors[..., k]
         amplitudes, phases = labels.vibration(vectors)
-        turned = np.minimum(whole.tangential[..., k] / np.maximum(np.abs(vectors), 1e-300), np.pi)
+        turned = np.minimum(whole.tangential[..., k] / np.maximum(abs(vectors), 1e-300), np.pi)
         columns += [
             (f"{name}amplitude{end}", amplitudes, "{:.4g}", about or "amplitude"),
             (f"{name}phase_deg", phases, "{:.1f}°", "phase"),

@@ -174,7 +174,7 @@ def _angles(table: Table, conventions: Conventions) -> FloatArray:
             angle[i] = degree.to_si(_by_name(table, i, stem, conventions))
         except NotANumber as error:
             table.complain(i, stem, str(error))
-    table.complain_where(np.abs(angle) > FULL_TURN, places[0], "an angle from -360 to 360 degrees")
+    table.complain_where(abs(angle) > FULL_TURN, places[0], "an angle from -360 to 360 degrees")
     for i, action in enumerate(table.texts("action")):
         if action.casefold() in ("remove", "removed"):
             angle[i] = degree.to_si((angle[i] * degree.scale + 180.0) % 360.0)

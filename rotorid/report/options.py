@@ -45,8 +45,11 @@ def checked(given: object, kind: type[_T]) -> _T:
 
 def changed(options: DataclassInstance) -> dict[str, object]:
     """Options that differ from their defaults."""
-    given = {field: getattr(options, field.name) for field in dataclasses.fields(options)}
-    return {field.name: value for field, value in given.items() if plain(value) != plain(field.default)}
+    return {
+        field.name: value
+        for field in dataclasses.fields(options)
+        if plain(value := getattr(options, field.name)) != plain(field.default)
+    }
 
 
 def refuse(options: DataclassInstance, needless: Collection[str], why: str) -> None:
