@@ -86,7 +86,7 @@ def choose(job: Job, kind: str | None = None, *, refined: bool = False) -> tuple
 
 def counted(job: Job) -> Trials | None:
     """The check runs, with weights of what the trial weights are of; None: there are none."""
-    return job.check if job.check is None or job.held is None else job.held.of_runs(job.check)
+    return job.held.of_runs(job.check) if job.check and job.held else job.check
 
 
 def of_planes(
@@ -108,8 +108,8 @@ def of_planes(
         )
     influence = mapped(influence, of.planes, of.inverse)
     if of.constrained:
-        words = f"{only}: what weights beside these do, such as the rounding of pieces, is not known"
-        notes = (*influence.remarks.notes, words)
+        unknown = f"{only}: what weights beside these do, such as the rounding of pieces, is not known"
+        notes = *influence.remarks.notes, unknown
         influence = replace(influence, remarks=influence.remarks._replace(notes=notes))
     if job.check is not None and job.check.planes and influence.mounted.run == job.check.runs[-1]:
         there = dict(zip(job.check.planes, job.check.weights[-1], strict=True))
@@ -142,7 +142,7 @@ def _separate(trials: Trials) -> bool:
 
 def counted_before(job: Job) -> bool:
     """Whether the calibration of the job's rotor was made from its own runs: they must not count twice."""
-    calibration = job.rotor and job.rotor.calibration
+    calibration = None if job.rotor is None else job.rotor.calibration
     job_and_runs = job.files[:2]  # the job, then its runs
     return calibration is not None and any(sha256(file) in calibration.data.values() for file in job_and_runs)
 
@@ -175,8 +175,8 @@ def unknowns_of(job: Job, influence: Influence) -> list[str]:
 
     planes, names = used_planes(job, influence), [*job.groups]
     with suppress(ValueError):
-        of = unknowns(job.groups, names, planes) if names else None
-        if of is not None and not of.constrained and of.planes == tuple(planes):
+        of = unknowns(job.groups, names, planes)
+        if names and not of.constrained and of.planes == tuple(planes):
             return names
     return planes
 
