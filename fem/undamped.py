@@ -23,7 +23,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import blas, lapack
 
 from fem.assembly import (
     TO_XY,
@@ -679,13 +678,15 @@ def factor(pencil: Pencil) -> tuple[float, AnyArray, AnyArray]:
     ValueError
         If the matrix is singular, or not positive, all the same.
     """
+    from scipy.linalg.lapack import dpbtrf, zpbtrf
+
     rotor, free = pencil.rotor, pencil.rigid.size
     mass = rotor.total_mass
     if not mass:
         raise ValueError("the rotor has no mass: give the shaft a density, or add discs")
     bending = 500 * (rotor.length @ (rotor.youngs_modulus * rotor.second_moment)) / rotor.positions[-1] ** 4
     scale = bending / mass
-    pbtrf = lapack.zpbtrf if np.iscomplexobj(pencil.stiffness) else lapack.dpbtrf
+    pbtrf = zpbtrf if np.iscomplexobj(pencil.stiffness) else dpbtrf
     for shift in (scale,) if free else (0.0,) if pencil.hold >= 1e-3 * bending else (scale, 0.0):
         K = pencil.stiffness + shift * pencil.mass
         U, info = pbtrf(K)
@@ -755,22 +756,24 @@ def fine_mesh_warning(rotor: Rotor, rounding: FloatArray) -> tuple[str, ...]:
 
 def _largest(T: AnyArray, m: int, energy: AnyArray | None = None) -> tuple[FloatArray, AnyArray]:
     """The m eigenvalues of largest size of a Hermitian matrix, and their vectors of length, or energy, 1."""
+    from scipy.linalg.lapack import dormqr, dstev, dsygv, dsytrd, zhegv
+
     real, info = np.isrealobj(T), 1
     if energy is not None:
-        mu, Q, info = (lapack.dsygv if real else lapack.zhegv)(T, energy)
+        mu, Q, info = (dsygv if real else zhegv)(T, energy)
         if info:
             raise ValueError(_UNSTABLE)
     elif real:  # tridiagonal first, large entries ahead: the largest need but its first rows
-        packed, d, e, tau, _ = lapack.dsytrd(T, lower=True)
+        packed, d, e, tau, _ = dsytrd(T, lower=True)
         rows = min(2 * m + 8, d.size)
-        mu, V, info = lapack.dstev(d[:rows], e[: rows - 1])
+        mu, V, info = dstev(d[:rows], e[: rows - 1])
         others = math.hypot(*d[rows:].tolist(), *e[rows - 1 :].tolist())
         if others:
             least, mu, V = mu[0], mu[-m:], V[:, -m:]
             info = info or max(-least, 20 * others, 1e13 * others * max(map(abs, V[-1]))) > mu[0]
         Q = np.zeros((d.size, mu.size), order="F")
         Q[:rows] = V
-        Q[1:] = lapack.dormqr("L", "N", packed[1:, : rows - 1], tau[: rows - 1], Q[1:], T.size)[0]
+        Q[1:] = dormqr("L", "N", packed[1:, : rows - 1], tau[: rows - 1], Q[1:], T.size)[0]
     if info:
         mu, Q = np.linalg.eigh(T)
     order = (-abs(mu)).argsort(kind="stable")[:m]
@@ -782,6 +785,8 @@ def _vectors(pencil: Pencil, U: AnyArray, m: int, rigid: AnyArray) -> tuple[AnyA
 
     They are m, and one that may be less exact; none of them is a rigid motion: `rigid` is M times these.
     """
+    from scipy.linalg import blas, lapack
+
     tbtrs, trsm = (lapack.dtbtrs, blas.dtrsm) if np.isrealobj(U) else (lapack.ztbtrs, blas.ztrsm)
     size, block = pencil.mass.shape[1], 4  # equal frequencies are not missed
     most = max(min(m + 1, finite_modes(pencil) - rigid.shape[1]), 1)
