@@ -23,7 +23,6 @@ from fem import (
     Support,
 )
 from fem.parameters import expand
-from rotorid.base.arrays import FloatArray
 from rotorid.base.tables import csv_bytes
 from rotorid.base.text import counted
 from rotorid.files import units
@@ -297,7 +296,7 @@ def _shaft(path: Path, material: Material) -> dict[str, Any]:
     """What a rotor table says, by the attributes of a rotor."""
     problems, doubts = Problems(), Problems()
     table = read_table(path, "rotor", COLUMNS, problems)
-    values: dict[str, FloatArray] = {}
+    values = {}
     for stem in (column.stem for column in COLUMNS if column.unit):
         default = getattr(material, stem, 0.0)
         values[stem] = np.where(table.is_blank(stem), default, table.numbers(stem, default))
@@ -409,7 +408,7 @@ def rotor_file_bytes(path: Path, rotor: Rotor) -> dict[Path, bytes]:
 
 def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     shaft, material = path.with_name(f"{path.stem}_shaft.csv"), dict[str, float]()
-    columns: dict[str, list[Any]] = {"element": [str(i + 1) for i in range(rotor.n_elements)]}
+    columns = {"element": [str(i + 1) for i in range(rotor.n_elements)]}
     for name, column in OF_ELEMENTS.items():
         values = getattr(rotor, name)
         if name in Material.model_fields and np.ptp(values) == 0:
