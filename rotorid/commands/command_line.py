@@ -102,12 +102,7 @@ class Destination:
         check_targets([(path, endings) for path, endings, _ in asked])
         with busy(what):
             made = work()
-        document = made.document
-        if self.output and "rotor" in document and self.output.suffix == ".toml":
-            document["rotor"] = str(self.output)  # which `calibrate` has written
         equations = made.equations if self.show else None
-        if equations:
-            document["equations"] = equations.to_dict()
         built: dict[Path, bytes] = {}
         for path, _, build in asked:
             if path is not None:
@@ -116,9 +111,14 @@ class Destination:
                 except OSError as error:  # a workbook needs room for temporary files
                     raise refusal(path, f"a file that can be written ({error.strerror})") from error
                 built |= file if isinstance(file, Mapping) else {path: file}
-        check_inputs(built, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
+        check_inputs(built, [Path(entry["file"]) for entry in made.provenance["inputs"]])
         write_files(built)
         if self.json:
+            document = made.document
+            if self.output and "rotor" in document and self.output.suffix == ".toml":
+                document["rotor"] = str(self.output)  # which `calibrate` has written
+            if equations:
+                document["equations"] = equations.to_dict()
             typer.echo(json_text(document))
             return
         written = [f"written: {printable(str(path))}" for path in built]
