@@ -291,7 +291,7 @@ def _enough(
 def _columns(m: Mounted) -> tuple[Column, ...]:
     """A row for each hole that gets something; one without hole for a plane where any angle is possible."""
     c, labels = m.correction, m.correction.labels
-    places: list[tuple[str, str, complex, str]] = []
+    places = []
     each = zip(c.planes, m.holes, m.discrete.mountings, m.weights.tolist(), strict=True)
     for plane, holes, mounting, weight in each:
         if holes is None or mounting is None:

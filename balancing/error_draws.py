@@ -187,7 +187,6 @@ def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading
     Y = trials.mean
     R, S, C = Y.shape
     n = G.shape[-2]
-    B = np.broadcast_to(stretch(G), (S, C, 2 * n, 2 * R)).reshape(S, C, 2 * n, R, 2)
     G = np.broadcast_to(G, (S, C, n, R))
     variances = [reading.covariance(trials)]
     parts, kinds = [np.einsum("scnr,mrsc->mscn", G, job_columns(trials, W))], [KNOWN]
@@ -199,8 +198,13 @@ def run_noise(trials: Trials, W: ComplexArray, G: ComplexArray, reading: Reading
         further = np.einsum("scnr,scp->rpscn", G, c).reshape(-1, S, C, n)
         parts = [common, 1j * common, loaded, 1j * loaded, further, 1j * further, *parts]
         kinds = [COMMON, COMMON, LOADS, LOADS, UNBALANCE, UNBALANCE, KNOWN]
-    blocks = [np.einsum("scark,rsckl,scbrl->scab", B, part, B, optimize=True) for part in variances]
-    return Noise(np.array(blocks), np.concatenate(parts), np.repeat(kinds, [len(part) for part in parts]))
+    blocks = np.empty((len(variances), S, C, 2 * n, 2 * n))
+    for s in range(S):  # at all speeds the products would take ten times as much
+        B = stretch(G[s]).reshape(C, 2 * n, R, 2)
+        blocks[:, s] = [
+            np.einsum("cark,rckl,cbrl->cab", B, part[:, s], B, optimize=True) for part in variances
+        ]
+    return Noise(blocks, np.concatenate(parts), np.repeat(kinds, [len(part) for part in parts]))
 
 
 def drawn(noise: Noise, factors: FloatArray, seed: int) -> Iterator[ComplexArray]:
@@ -208,7 +212,9 @@ def drawn(noise: Noise, factors: FloatArray, seed: int) -> Iterator[ComplexArray
     S, C = noise.blocks.shape[1:3]
     step = max(1, BLOCK // (S * C))
     rngs = [np.random.default_rng([seed, part]) for part in (1, 2, 3)]
-    roots = [covariance_root(part, np.einsum("...ii->...i", part)) for part in noise.blocks]
+    roots = [
+        np.array([covariance_root(at, np.einsum("...ii->...i", at)) for at in part]) for part in noise.blocks
+    ]
     for start in range(0, len(factors), step):
         f = factors[start : start + step]
         z = rngs[2].standard_normal((len(f), len(noise.kind))) * f[:, noise.kind]

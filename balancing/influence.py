@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from balancing.conditioning import UndeterminedError, check_effects, check_runs
 from balancing.conventions import Labels
@@ -98,7 +98,7 @@ class Influence:
         keep(self, speeds=check_speeds(self.speeds), **names)
         S, C, P = len(self.speeds), len(self.sensors), len(self.planes)
         for name, shape in (("W", (S, C, P)), ("baseline", (S, C))):
-            array: NDArray[np.complex128] = np.array(getattr(self, name), dtype=complex)
+            array = np.array(getattr(self, name), dtype=complex)
             wrong = np.isinf(array) | (np.isnan(array) & (name == "W"))
             if array.shape != shape or wrong.any():
                 raise ValueError(f"{name} must be finite, of shape {shape}; got shape {array.shape}")

@@ -122,7 +122,7 @@ def allowed_sectors(forbidden: Sequence[Arc]) -> Sectors:
     if not forbidden:
         return None
     edges = sorted({edge % TURN for start, width in forbidden for edge in (start, start + width)})
-    sectors: list[Arc] = []
+    sectors = []
     for first, last in zip(edges, [*edges[1:], edges[0] + TURN], strict=True):
         middle = (first + last) / 2
         if last - first < 1e-9 or any((middle - start) % TURN < width for start, width in forbidden):

@@ -348,7 +348,7 @@ def solve_discrete(
     """
     W, Y, w = check_stack(W, Y, row_weights)
     N, P = W.shape
-    named: Mapping[Any, Holes | None] = planes if isinstance(planes, Mapping) else dict(enumerate(planes, 1))
+    named = planes if isinstance(planes, Mapping) else dict(enumerate(planes, 1))
     if len(named) != P:
         raise ValueError(f"there must be holes, or None, for each of the {P} planes")
     limits, heavier = limits or Limits.none(1, N, P), HEAVIER if enough else np.inf

@@ -261,7 +261,7 @@ def job_columns(trials: Trials, W: ComplexArray) -> ComplexArray:
 
     A weight that stays in its plane from one run to the next has one error in both.
     """
-    out: list[ComplexArray] = []
+    out = []
     for p, weights in enumerate(trials.weights.T):
         stays = np.cumsum(weights != np.append(0, weights[:-1]))
         for k in np.unique(stays[weights != 0]) if trials.planes[p] != TURNED else ():

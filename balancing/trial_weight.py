@@ -308,7 +308,7 @@ def trial_from_coefficients(
         )
     if not w.any():
         raise ValueError(f"plane {plane!r} acts on no reading: choose another plane")
-    warnings: list[str] = []
+    warnings = []
     positive("share of the largest reading", share)
     amount = share * size / float(np.abs(w).max())
     reading = reading_names(labels, influence.sensors, influence.speeds)[int(np.argmax(np.abs(w)))]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from balancing.conventions import Labels
-from rotorid.base.arrays import AnyArray, ComplexArray, FloatArray, IntArray
+from rotorid.base.arrays import ComplexArray, FloatArray, IntArray
 from rotorid.base.text import RPM
 
 Arc = tuple[float, float]
@@ -195,7 +195,7 @@ class Trials:
         for name, shape in shapes.items():
             if getattr(self, name) is None:
                 continue
-            array: AnyArray = np.array(getattr(self, name), dtype=complex if name == "weights" else float)
+            array = np.array(getattr(self, name), dtype=complex if name == "weights" else float)
             there = np.ones(shape, dtype=bool) if len(shape) < 3 else ~np.isnan(readings)
             if array.shape != shape or not np.isfinite(array[..., there]).all():
                 raise ValueError(f"{name} must be finite, of shape {shape}; got {array.shape}")

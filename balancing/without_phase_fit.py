@@ -139,7 +139,7 @@ def effects(parameters: FloatArray) -> ComplexArray:
 def best_weights(x: FloatArray, weights: FloatArray) -> ComplexArray:
     """Weights (n, P) that leave least, by parameters (n, N, 1 + 2P)."""
     y, w = x[..., :1] * weights[:, None], effects(x) * weights[:, None]
-    return np.asarray(-(np.linalg.pinv(w, 1e-7) @ y)[..., 0])
+    return -(np.linalg.pinv(w, 1e-7) @ y)[..., 0]
 
 
 def common_weight(

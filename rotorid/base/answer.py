@@ -28,6 +28,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import accumulate
+from typing import Any
 
 from rotorid.base.text import capital, counted, cut
 
@@ -52,7 +53,7 @@ class Answer:
     warnings, notes
         Clauses without "Warning: " and "Note: ", the worst first.
     tables
-        Blocks that only the whole text has.
+        Blocks that only the whole text has, or what makes one.
     more
         What these show, in words.
     short
@@ -65,7 +66,7 @@ class Answer:
     numbers: str = ""
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    tables: tuple[str, ...] = ()
+    tables: tuple[Any, ...] = ()
     more: str = ""
     short: bool = False
     to_mount: bool = False
@@ -100,7 +101,8 @@ class Answer:
         """Everything."""
         head = [self.judgement] if self.short else [self.judgement, self.numbers]
         lines = [*map(_wrapped, head), *self._remarks(tuple)]
-        return "\n\n".join(filter(None, (*map("\n".join, lines), *self.tables)))
+        tables = (each() if callable(each) else each for each in self.tables)
+        return "\n\n".join(filter(None, (*map("\n".join, lines), *tables)))
 
     def _remarks(self, chosen: Callable[[Iterable[str]], Iterable[str]]) -> list[list[str]]:
         """Lines of the chosen warnings, then of notes."""
@@ -128,7 +130,7 @@ def together(answers: Iterable[Answer]) -> Answer:
     def joined(field: str, between: str) -> str:
         return between.join(filter(None, dict.fromkeys(getattr(one, field) for one in each)))
 
-    def all_of(field: str) -> tuple[str, ...]:
+    def all_of(field: str) -> Any:  # noqa: ANN401
         return tuple(dict.fromkeys(words for one in each for words in getattr(one, field)))
 
     return Answer(

@@ -102,12 +102,7 @@ class Destination:
         check_targets([(path, endings) for path, endings, _ in asked])
         with busy(what):
             made = work()
-        document = made.document
-        if self.output and "rotor" in document and self.output.suffix == ".toml":
-            document["rotor"] = str(self.output)  # which `calibrate` has written
         equations = made.equations if self.show else None
-        if equations:
-            document["equations"] = equations.to_dict()
         built: dict[Path, bytes] = {}
         for path, _, build in asked:
             if path is not None:
@@ -116,9 +111,14 @@ class Destination:
                 except OSError as error:  # a workbook needs room for temporary files
                     raise refusal(path, f"a file that can be written ({error.strerror})") from error
                 built |= file if isinstance(file, Mapping) else {path: file}
-        check_inputs(built, [Path(entry["file"]) for entry in document["provenance"]["inputs"]])
+        check_inputs(built, [Path(entry["file"]) for entry in made.provenance["inputs"]])
         write_files(built)
         if self.json:
+            document = made.document
+            if self.output and "rotor" in document and self.output.suffix == ".toml":
+                document["rotor"] = str(self.output)  # which `calibrate` has written
+            if equations:
+                document["equations"] = equations.to_dict()
             typer.echo(json_text(document))
             return
         answer = equations.answer(made.answer) if equations else made.answer
@@ -185,7 +185,7 @@ def typer_command(work: Callable[..., Outcome]) -> Callable[..., None]:
     kind, about = options_of(work), _documentation(work)
     every = list(inspect.signature(work).parameters.items())
     arguments = dict(every[: [name for name, _ in every].index("options")])
-    to: Sequence[str] = getattr(kind, "to", WITH_REPORT)
+    to = getattr(kind, "to", WITH_REPORT)
     panels: Mapping[str, str] = getattr(kind, "panels", {})
     titles = {**panels, "Output": " ".join((*to, panels.get("Output", "")))}
     panel_of = {name: title for title, names in titles.items() for name in names.split()}

@@ -146,8 +146,10 @@ def _tables(fit: FittedModes) -> tuple[Table, Table]:
     """Frequencies and damping, and shapes."""
     shapes = [Column("point", fit.readings.sensors)]
     for mode, (shape, std) in enumerate(zip(fit.shapes, fit.shape_std, strict=True), 1):
-        shapes.append(Column(f"shape {mode}", shape, "{:.4g}".format))
-        shapes.append(Column("±", abs(shape) * std, error_figures))
+        shapes += (
+            Column(f"shape {mode}", shape, "{:.4g}".format),
+            Column("±", abs(shape) * std, error_figures),
+        )
     return Table("modes", frequencies(fit, "ω, rad/s")), Table("shapes", tuple(shapes))
 
 

@@ -61,7 +61,7 @@ def sensors(given: str | Sequence[Sensor], what: str = "--sensors") -> list[Sens
         raise ValueError(f"{what}: at least one node or station is needed")
     if not isinstance(given, str):
         return list(given)
-    places: list[Sensor] = []
+    places = []
     for part in given.split(","):
         head, colon, tail = part.partition(":")  # names of stations hold no colon
         (node,) = nodes(head, what)

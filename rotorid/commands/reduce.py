@@ -164,9 +164,9 @@ def reduce(rotor: Rotor | Path | str | None = None, options: ReduceOptions | Non
 
 def _outcome(parts: Mapping[str, Any], options: ReduceOptions, name: str) -> Outcome:
     """The masses, and what was asked for beside them, by their keys in the document; the ranking first."""
-    result: Reduction = parts[""]
+    result = parts[""]
     small: SmallModel | None = parts.get("small_model")
-    placement: Placement | None = parts.get("placement")
+    placement = parts.get("placement")
     force = [] if options.force is None else nodes(options.force, "--force")
     forces = force if result.rotor is None else [result.rotor.node(node) for node in force]
     speed = _speed(result.rotor, options)

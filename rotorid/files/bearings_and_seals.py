@@ -301,7 +301,7 @@ def force_tables(forces: Iterable[NodeForce]) -> Written:
 def support_tables(supports: Sequence[Support], path: Path) -> tuple[Written, dict[Path, bytes]]:
     """Supports in order as tables `[[bearing]]`, in SI, and those over speed as files beside the file."""
     tables: Written = {}
-    files: dict[Path, bytes] = {}
+    files = {}
     for number, support in enumerate(supports, start=1):
         values, columns = vars(support) | dict.fromkeys((*ENTRIES, "table")), _columns(support)
         if support.speeds:

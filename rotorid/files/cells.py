@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
+from typing import Any
 
 from rotorid.files.input_problems import Problems, TableWarning, refusal
 
@@ -22,6 +23,8 @@ MOST_ABOVE = 60
 """Rows among which a header stands that is known by its columns."""
 LONGEST_LINE = 10_000
 """Of a header that is not the first line."""
+BLOCK = 64
+"""Rows whose cells of a column are kept together."""
 MOST_CELLS = 5_000_000
 """Of a file."""
 SMALLEST, LARGEST = 1e-30, 1e30
@@ -94,6 +97,19 @@ Finder = Callable[[Sequence[Sequence[str]]], tuple[int, int, Sequence[str]] | No
 """Finds where a header surely stands: its first and last row among some, and its names; None: nowhere."""
 
 
+class Cells:
+    """Cells of a column of a text file, `BLOCK` of them as one text: alone each takes five times as much."""
+
+    def __init__(self, cells: Sequence[str]) -> None:
+        self.blocks = ["\0".join(cells[k : k + BLOCK]) for k in range(0, len(cells), BLOCK)]
+
+    def __getitem__(self, index: int) -> str:
+        return self.blocks[index // BLOCK].split("\0")[index % BLOCK]
+
+    def __iter__(self) -> Iterator[str]:
+        return (cell for block in self.blocks for cell in block.split("\0"))
+
+
 @dataclass(frozen=True)
 class Grid:
     """A header and rows of cells.
@@ -106,8 +122,10 @@ class Grid:
         Row number of the header.
     header
         Names, `""` where a column has none (and then no cell either).
-    rows
-        Row number and cells, each as long as the header.
+    numbers
+        Row numbers.
+    columns
+        Cells of each column of the header: tuples, or `Cells`.
     separator
         Between the columns of a text file; empty for a sheet.
     complete
@@ -119,7 +137,8 @@ class Grid:
     source: str
     header_row: int
     header: tuple[str, ...]
-    rows: tuple[Row, ...]
+    numbers: tuple[int, ...]
+    columns: Sequence[Any]
     separator: str = ""
     complete: bool = True
     named: tuple[tuple[str, ...], ...] = ()
@@ -170,7 +189,7 @@ def decode(source: str, data: bytes) -> str:
 
 
 def parse_text(
-    source: str, text: str, problems: Problems, *, may_be_empty: bool = False, find: Finder | None = None
+    source: str, text: str, problems: Problems, *, may_be_empty: bool, find: Finder | None
 ) -> Grid:
     """Rows of cells of a text table; `may_be_empty` as in `make_grid`.
 
@@ -266,7 +285,7 @@ def make_grid(
     separator: str,
     problems: Problems,
     *,
-    place: tuple[int, tuple[str, ...]] = (0, ()),
+    place: tuple[int, tuple[str, ...]],
     complete: bool = True,
     may_be_empty: bool = False,
 ) -> Grid:
@@ -314,7 +333,10 @@ def make_grid(
                     )
                 problems.add(expected, source, number, None, show(cells[lost[-1]]))
         body = [(number, (cells + ("",) * width)[:width]) for number, cells in body]
-    return Grid(source, header_row, tuple(header), tuple(body), separator, complete)
+    each = ((number, *cells) for number, cells in body)
+    numbers, *columns = zip(*each, strict=True) if body else [()] * (width + 1)
+    kept = [Cells(cells) for cells in columns] if separator else columns
+    return Grid(source, header_row, tuple(header), numbers, kept, separator, complete)
 
 
 class NotANumber(ValueError):

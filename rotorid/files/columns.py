@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache, partial
+from itertools import chain
 from pathlib import Path
 from typing import Any, SupportsIndex
 
@@ -38,6 +40,8 @@ from rotorid.files.units import Unit, UnitError, UnitReader
 REMARKS = ("note", "comment")
 TOP = 10_000
 """Bytes of a file in which its headings stand."""
+LATEST = 10_000
+"""Cells of a column whose values are kept: a long one says most of its numbers again."""
 _SURE = 15
 """A float shows so many digits truly; more, as in 0.30000000000000004, are those of a computation."""
 TEXT, UNCLEAR = Unit("", "text"), Unit("?", "unclear")
@@ -90,7 +94,7 @@ class Field:
 
     name: str
     unit: Unit
-    cells: tuple[Cell, ...]
+    cells: Any
     values: Any
     names: tuple[str, ...]
 
@@ -127,8 +131,7 @@ class Table:
 
     def numbers(self, stem: str, missing: float = math.nan) -> FloatArray:
         """Values in SI, shape (rows,); `missing` everywhere if the table has no such column."""
-        values: FloatArray = self.fields[stem].values if stem in self else np.full(len(self), missing)
-        return values
+        return self.fields[stem].values if stem in self else np.full(len(self), missing)
 
     def steps(self, stem: str) -> FloatArray:
         """Steps in SI in which the numbers of a column without problems are written, shape (rows,).
@@ -143,9 +146,9 @@ class Table:
         it is to 12. Cells of a workbook have the digits that their format shows, or as many as they need.
         """
         cells = self.fields[stem].cells
-        texts = [(cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".") for cell in cells]
-        digits = {text: _digits(text) for text in set(texts)}  # a long column says most of its numbers again
-        decimals, significant, first = np.array([digits[text] for text in texts], dtype=int).reshape(-1, 3).T
+        texts = ((cell.text if isinstance(cell, Shown) else show(cell)).replace(",", ".") for cell in cells)
+        digits = np.fromiter(chain.from_iterable(map(_digits, texts)), int)
+        decimals, significant, first = digits.reshape(-1, 3).T
         most = decimals.max(initial=-99)
         fixed = np.minimum(most, significant.max(initial=0) - 1 - first)
         written = np.where(significant > 0, np.maximum(decimals, fixed), most)
@@ -166,7 +169,7 @@ class Table:
     def is_blank(self, stem: str) -> BoolArray:
         """Which cells of a column are empty, shape (rows,); none if the table has no such column."""
         cells = self.fields[stem].cells if stem in self else self.rows
-        return np.array([cell == "" for cell in cells], dtype=bool)
+        return np.fromiter((cell == "" for cell in cells), bool)
 
     def complain(self, index: SupportsIndex, stem: str, expected: str) -> None:
         """Note a problem with one cell."""
@@ -201,10 +204,16 @@ class Table:
 
         Values None and "" do not count.
         """
-        first: dict[Hashable, int] = {}
-        for index, value in enumerate(values):
-            if value not in (None, "") and first.setdefault(value, index) != index:
-                self.complain(index, stem, expected.format(self.rows[first[value]]))
+        for index, first in repeated(values):
+            self.complain(index, stem, expected.format(self.rows[first]))
+
+
+def repeated(values: Iterable[Hashable]) -> Iterator[tuple[int, int]]:
+    """Where a value stands again, and where it stood first; None and "" do not count."""
+    first: dict[Hashable, int] = {}
+    for index, value in enumerate(values):
+        if value not in (None, "") and first.setdefault(value, index) != index:
+            yield index, first[value]
 
 
 def read_table(
@@ -309,13 +318,12 @@ def make_table(grid: Grid, columns: Sequence[Column], problems: Problems) -> Tab
             name = grid.named[0][k] if grid.named else names[k]
             problems.add(wrong, grid.source, grid.header_row, name, name)
     of_numbers = [k for k, unit, _ in places.values() if unit is not TEXT]
-    commas = (cell for k in of_numbers for _, row in grid.rows if isinstance(cell := row[k], str))
+    commas = (cell for k in of_numbers for cell in grid.columns[k] if isinstance(cell, str))
     comma = decimal_comma(commas, grid.separator)
     fields = {stem: _field(grid, *place, problems, comma=comma) for stem, place in places.items()}
     if any(column.required and column.stem not in places for column in columns):
         return None
-    rows = tuple(number for number, _ in grid.rows)
-    return Table(grid, rows, fields, problems, misspelt)
+    return Table(grid, grid.numbers, fields, problems, misspelt)
 
 
 def column_of(name: str, columns: Sequence[Column]) -> Column | None:
@@ -360,27 +368,27 @@ def _has_columns(
 
 
 def _field(grid: Grid, index: int, unit: Unit, column: Column, problems: Problems, *, comma: bool) -> Field:
-    cells, header = tuple(row[index] for _, row in grid.rows), grid.header[index]
-    names = tuple(row[index] for row in grid.named) or (header,) * len(cells)
-    doubtful: set[str] = set()
+    cells, header = grid.columns[index], grid.header[index]
+    names = tuple(row[index] for row in grid.named) or (header,) * len(grid.numbers)
+    doubtful = set()
     if unit is not TEXT and not comma and grid.separator in (";", "\t"):
         doubtful = thousands_or_decimals((c for c in cells if isinstance(c, str)), header)
-    nothing: str | float = "" if unit is TEXT else math.nan
-    # most cells of a long table say what another one has said
-    read: dict[Cell, str | float] = {"": nothing} if column.blank else {}
+    value = lru_cache(LATEST)(partial(_value, unit, grid.separator, doubtful, comma))
+    values = list[Any]()
     for place, cell in enumerate(cells):
+        one = "" if unit is TEXT else math.nan
         try:
-            if cell not in read:
-                read[cell] = _value(cell, unit, grid.separator, doubtful, comma=comma)
+            if cell != "" or not column.blank:
+                one = value(cell)
         except NotANumber as error:
             if not column.lenient:
-                problems.add(str(error), grid.source, grid.rows[place][0], names[place], show(cell))
-    values = [read.get(cell, nothing) for cell in cells]
+                problems.add(str(error), grid.source, grid.numbers[place], names[place], show(cell))
+        values.append(one)
     name = names[0] if len(set(names)) == 1 else header
     return Field(name, unit, cells, values if unit is TEXT else np.array(values, dtype=float), names)
 
 
-def _value(cell: Cell, unit: Unit, separator: str, doubtful: set[str], *, comma: bool) -> str | float:
+def _value(unit: Unit, separator: str, doubtful: set[str], comma: bool, cell: Cell) -> str | float:
     """A name, or a number in SI; NotANumber says what is expected."""
     if isinstance(cell, BadCell):
         raise NotANumber(cell.expected)
@@ -411,6 +419,7 @@ def _value(cell: Cell, unit: Unit, separator: str, doubtful: set[str], *, comma:
     return value
 
 
+@lru_cache(LATEST)
 def _digits(text: str) -> tuple[int, int, int]:
     """Decimals, significant digits (none of 0), and at which power of ten the first one stands."""
     mantissa, _, exponent = text.lower().partition("e")

@@ -113,7 +113,7 @@ def load_influence(
     """As `read_influence`, from a file or from the cells of a sheet, and the conventions that it states."""
     if isinstance(source, Path) and source.suffix.lower() == ".json":
         influence = _from_json(source)
-        stated: dict[str, Any] = {key: getattr(influence.labels, key) for key in ("phase", "angles")}
+        stated = {key: getattr(influence.labels, key) for key in ("phase", "angles")}
     else:
         problems = Problems()
         grid = read_grid(source, "influence", problems)
@@ -131,7 +131,7 @@ def load_influence(
 
 def _tidied(grid: Grid) -> Grid:
     """The table with weights per vibration in influence_<unit> and phase_deg."""
-    header, rows = [*grid.header], grid.rows
+    header, columns = [*grid.header], [*grid.columns]
     for at, name in enumerate(grid.header):
         match = _NAMED.fullmatch(name)
         try:
@@ -144,15 +144,12 @@ def _tidied(grid: Grid) -> Grid:
             continue
         header = [f"phase_{unit}" if unit else h.name for unit, h in zip(units_of, headings, strict=True)]
         header[at] = f"influence_{weight.name}_per_{vibration.name}"
-        vectors = [vector_in(cells[at]) for _, cells in rows]
+        vectors = [*map(vector_in, columns[at])]
         if not any(units_of) and None not in vectors:
             header.append("phase_deg")
-            rows = tuple(
-                (number, (*cells[:at], vector[0], *cells[at + 1 :], vector[1].rstrip("° ")))
-                for (number, cells), vector in zip(rows, vectors, strict=True)
-                if vector
-            )
-    return replace(grid, header=tuple(header), rows=rows)
+            columns[at] = [vector[0] for vector in vectors if vector]
+            columns.append([vector[1].rstrip("° ") for vector in vectors if vector])
+    return replace(grid, header=tuple(header), columns=columns)
 
 
 def _from_table(table: Table, labels: Labels) -> Influence:

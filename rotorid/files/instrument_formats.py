@@ -260,7 +260,7 @@ def read_responses(path: Path) -> tuple[FloatArray, dict[str, ComplexArray]]:
             raise refusal(path, expected)
         used = hertz[0] > 0
         omega = 2.0 * np.pi * hertz[0][used]
-        signals: dict[str, ComplexArray] = {}
+        signals = {}
         for name, one in zip(names, sets, strict=True):
             labels = (one[f"{part}_axis_units_lab"] or "" for part in ("ordinate", "orddenom"))
             motion, force = (spelt(label.strip().replace("^", "").removeprefix("NONE")) for label in labels)

@@ -86,7 +86,7 @@ def _read_rows(grid: Grid, sheet: str, job: WrittenJob, problems: Problems) -> N
         expected = f"a column {first}; the columns are {there}" if named else "the columns key and value"
         problems.add(expected, grid.source, grid.header_row, first)
         return
-    for row, cells in grid.rows:
+    for row, *cells in zip(grid.numbers, *grid.columns, strict=True):
         key, place = show(cells[at]), (grid.source, row, grid.header[at])
         parts = [sheet, key] if named else _key_parts(key)
         again = job.where.get(".".join(parts))
@@ -123,7 +123,7 @@ def _key_parts(key: str) -> list[str]:
 
 def _put(job: WrittenJob, parts: Sequence[str], value: object, place: Place) -> bool:
     """Store a value under its dotted key; false where a part of the key holds a value already."""
-    inner: Any = job.settings
+    inner = job.settings
     for depth, part in enumerate(parts[:-1], start=1):
         job.where.setdefault(".".join(parts[:depth]), place)
         inner = inner.setdefault(part, {})
@@ -166,7 +166,7 @@ def job_workbook_bytes(files: Sequence[Path], results: Any, provenance: Mapping[
     from rotorid.files.influence import influence_table
 
     document = results.to_dict()
-    tables: dict[str, list[Any]] = {"": document["corrections"], "summary": []}
+    tables = {"": document["corrections"], "summary": []}
     _collect({**document, "provenance": provenance}, (), tables)
     del tables["corrections"]
     tables["influence"] = influence_table(results.influence).records

@@ -181,7 +181,7 @@ def _of_readings(
 
 def _sizes(plane: Plane, field: str, labels: Labels, problems: Problems) -> tuple[float, ...]:
     """Weights that a plane states, as those of the job are (kg or kg·m); empty where it states none."""
-    stated: Quantity | None = getattr(plane, field)
+    stated = getattr(plane, field)
     if stated and labels.weight_unit == TRIAL_WEIGHTS:
         plane.complain(problems, field, "trial weights without ?, since this is no multiple of them")
         return ()
@@ -276,7 +276,7 @@ def with_taken(
         mounted = np.array([row[2] for row in here])
         size, holes_at = abs(mounted), np.exp(1j * free.angles)
         off = abs(mounted[:, None] - size[:, None] * holes_at)
-        taken: FloatArray = np.bincount(off.argmin(axis=1), size, len(holes_at)).astype(float)
+        taken = np.bincount(off.argmin(axis=1), size, len(holes_at)).astype(float)
         in_holes = (off.min(axis=1) <= IN_HOLE * size).all()
         if in_holes and taken.any() and not taken.all():
             sizes = free.pieces * check.labels.weight_scale

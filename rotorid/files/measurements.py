@@ -256,7 +256,7 @@ def _amplitude(table: Table, name: str) -> ComplexArray:
     if blank.all():
         table.as_whole(size, "a number in at least one row, or no such column")
     if not is_polar:
-        return np.asarray(first + 1j * np.where(blank, np.nan, second))
+        return first + 1j * np.where(blank, np.nan, second)
     table.complain_where(first < 0, size, "an amplitude of 0 or more (a real part may be negative)")
     return polar(first, second)
 
@@ -267,7 +267,7 @@ def _rounding(table: Table, rows: Experiments, outputs: Sequence[str]) -> dict[s
     Frequencies of excitation are set, not read; a shape that is 1 everywhere is the reference of the others.
     Nothing where a cell of a reading is blank, or a natural frequency shows no end of its digits.
     """
-    covariances: dict[str, FloatArray] = {}
+    covariances = {}
     for name in outputs:
         z, stems = rows.signals[name], _stems(table, name)
         if any(table.is_blank(stem).any() for stem in stems):
@@ -337,8 +337,8 @@ def read_record(
     ]
     grid = read_grid(path, "record", problems, first=True)
     if allow_missing:
-        rows = ((n, ("" if show(c).casefold() in MISSING else c for c in cells)) for n, cells in grid.rows)
-        grid = replace(grid, rows=tuple((number, tuple(cells)) for number, cells in rows))
+        known = [["" if show(c).casefold() in MISSING else c for c in cells] for cells in grid.columns]
+        grid = replace(grid, columns=known)
     table = problems.need(make_table(grid, columns, problems))
     clear = not len(problems)  # otherwise a misspelt column would be called missing
     t, outputs = table.numbers("t"), {name: table.numbers(name) for name in model.outputs if name in table}

@@ -130,7 +130,7 @@ def _vectors(
 
 def _nodes(table: Table, stem: str, rotor: Rotor | SmallModel | None) -> list[Node]:
     """Nodes in cells; without a rotor labels too, "" where there is a problem."""
-    nodes: list[Node] = []
+    nodes = []
     for row, name in enumerate(table.texts(stem)):
         try:
             if not (rotor and name):

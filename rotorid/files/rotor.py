@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from fem import Disc, Model, Rotor, Support
-from rotorid.base.arrays import FloatArray
 from rotorid.base.tables import csv_bytes
 from rotorid.files import units
 from rotorid.files.columns import OUTWARDS, Column, read_table
@@ -122,7 +121,7 @@ def _shaft(path: Path, material: Any) -> tuple[dict[str, Any], bool]:  # noqa: A
     """
     problems, doubts = Problems(), Problems()
     table = read_table(path, "rotor", COLUMNS, problems)
-    values: dict[str, FloatArray] = {}
+    values = {}
     for stem in (column.stem for column in COLUMNS if column.unit):
         default = getattr(material, stem, 0.0)
         values[stem] = np.where(table.is_blank(stem), default, table.numbers(stem, default))
@@ -219,7 +218,7 @@ def _files(path: Path, rotor: Rotor) -> dict[Path, bytes]:
     from rotorid.files.settings import toml_bytes
 
     shaft, material = path.with_name(f"{path.stem}_shaft.csv"), dict[str, float]()
-    columns: dict[str, list[Any]] = {"element": [str(i + 1) for i in range(rotor.n_elements)]}
+    columns = {"element": [str(i + 1) for i in range(rotor.n_elements)]}
     for name, column in OF_ELEMENTS.items():
         values = getattr(rotor, name)
         if name in Material.model_fields and np.ptp(values) == 0:

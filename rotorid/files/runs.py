@@ -7,10 +7,11 @@ trials; with times and standard deviations, or without, vectors over speed.
 from __future__ import annotations
 
 import re
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import groupby, islice
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray, turned
 from rotorid.base.text import Angles, Phase, listing
 from rotorid.files import units
 from rotorid.files.cells import Grid
-from rotorid.files.columns import Column, Source, Table, make_table
+from rotorid.files.columns import Column, Source, Table, make_table, repeated
 from rotorid.files.input_problems import MOST_LINES, Problems
 from rotorid.files.table_layouts import (
     DEFAULT_TOLERANCE,
@@ -257,7 +258,7 @@ def _index(table: Table, runs: Sequence[str], labels: Labels) -> FloatArray:
     by_run = dict(zip(run[::-1], index[::-1], strict=True))
     same = np.array([by_run[name] for name in run]) == index
     table.complain_where(~same, "index", "one index a run, the same in all its rows")
-    return np.asarray(labels.with_rotation(np.array([by_run[name] for name in runs])))
+    return labels.with_rotation(np.array([by_run[name] for name in runs]))
 
 
 def _merge_speeds(
@@ -287,14 +288,12 @@ def _merge_speeds(
     distinct = np.unique(values[usable])
     apart = [k > 0 and not same_speed(v, distinct[k - 1], band) for k, v in enumerate(distinct)]
     groups = np.cumsum(apart)[np.searchsorted(distinct, values[usable])].tolist()
-    read: dict[int, set[tuple[str, float]]] = defaultdict(set)
-    for row, g in zip(usable, groups, strict=True):
-        read[g].add((runs[row], float(values[row])))
+    read = {*zip(groups, values[usable].tolist(), (runs[row] for row in usable), strict=True)}
     merged, alike = [], []
-    for g in sorted(read):
-        speeds = sorted({speed for _, speed in read[g]})
-        one = speeds[0] if len(speeds) == 1 else float(np.mean(sorted(speed for _, speed in read[g])))
-        merged.append(one)
+    for _, group in groupby(sorted(read), itemgetter(0)):
+        of_runs = [speed for _, speed, _ in group]
+        speeds = [*dict.fromkeys(of_runs)]
+        merged.append(speeds[0] if len(speeds) == 1 else float(np.mean(of_runs)))
         if same_speed(speeds[0], speeds[-1], UNSAID):
             continue
         shown = [*map(in_unit, speeds)]
@@ -385,14 +384,14 @@ def _complain_about_twins(
     if stem not in table:
         stem, expected = "sensor", "one reading per run, speed and sensor (row {} has the same); "
         expected += "repeated readings need a column repeat"
-    first: dict[tuple[object, ...], int] = {}
     speed = table.numbers("speed")
-    for row, place in sorted(places.items()):
-        other = first.setdefault((place[1:], repeat[row]), row)
+    for row, other in repeated(
+        (places[row][1:], repeat[row]) if row in places else None for row in range(len(table))
+    ):
         if speed[other] != speed[row]:
             there = f"run {table.shown('run', row)!r} has {table.shown('speed', other)} as well"
             table.complain(row, "speed", f"one speed: {there}, {_remedy(tolerance_percent)}")
-        elif other != row:
+        else:
             table.complain(row, stem, expected.format(table.rows[other]))
 
 
@@ -469,9 +468,7 @@ def _instants(table: Table) -> FloatArray:
     keys = [*zip(runs, table.texts("sensor"), instants.tolist(), strict=True)]
     unlike = f"another sensor than in row {{}}, which has the same run and {where}"
     table.once("sensor", (None if np.isnan(key[2]) else key for key in keys), unlike)
-    first: dict[tuple[str, float], int] = {}
-    for row, (run, _, instant) in enumerate(keys):
-        other = first.setdefault((run, instant), row)
+    for row, other in repeated((run, instant) for run, _, instant in keys):
         if abs(speeds[row] - speeds[other]) > 1e-9 * speeds[other]:
             expected = f"{table.shown('speed', other)} as in row {table.rows[other]}, the same time"
             table.complain(row, "speed", expected)

@@ -200,7 +200,7 @@ def equations_of(
     for i in [names.index(name) for name in dampers]:
         damping[i, i] = f"{damping[i, i]!r} + d_{names[i]}" if damping[i, i] else f"d_{names[i]}"
     estimate = {f"d_{name}": float(value) for name, value in dampers.items()}
-    data: dict[str, Any] = {
+    data = {
         "speed_rad_s": float(motion.speed),
         "inputs": [*inputs],
         "coordinates": names,
@@ -245,7 +245,7 @@ def small_model_files(
     """
     arrays = {key: np.array(getattr(model, name)) for name, key in ARRAYS.items()}
     supports, files = support_tables(model.supports, path)
-    data: dict[str, Any] = {
+    data = {
         **{key: array.tolist() for key, array in arrays.items() if array.any() or "shaft" in key},
         **supports,
         **force_tables(model.forces),

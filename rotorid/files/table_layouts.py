@@ -14,13 +14,13 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from itertools import chain, combinations
 from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 from balancing import Labels
 from rotorid.base.text import SHORT_ANGLES, Angles, Phase, Rotation, listing
-from rotorid.files.cells import Cell, Grid, Row, show
+from rotorid.files.cells import Cell, Grid, show
 from rotorid.files.columns import REMARKS, Source, read_grid
 from rotorid.files.headings import (
     BOTH_UNITS,
@@ -120,7 +120,7 @@ class _Column(NamedTuple):
     heading: Heading
     stem: str
     unit: str
-    cells: Sequence[Cell]
+    cells: Any
 
     def name(self, place: int) -> str:
         """The name that it has in such a table; that of a remark is of no other column."""
@@ -138,7 +138,7 @@ def _unclear(grid: Grid, column: _Column, expected: str, cell: Cell | None = Non
     """What has no reading or several: of a heading, or the first cell of a column that is such."""
     row, value = grid.header_row, column.heading.name
     if cell is not None:
-        row, value = grid.rows[column.cells.index(cell)][0], show(cell)
+        row, value = grid.numbers[[*column.cells].index(cell)], show(cell)
     return refusal(grid.source, expected, row, column.heading.name, value)
 
 
@@ -201,9 +201,8 @@ def without_phases(grids: Sequence[Grid]) -> tuple[Sequence[Grid], list[str]]:
     ]
     cells, runs = set[str](), set[str]()
     for grid, k in zip(grids, places, strict=True):
-        cells |= {show(row[k]).strip().casefold() for _, row in grid.rows} if k is not None else {""}
-        run = grid.header.index("run") if "run" in grid.header else None
-        runs |= {show(row[run]) for _, row in grid.rows} if run is not None else set()
+        cells |= {show(cell).strip().casefold() for cell in grid.columns[k]} if k is not None else {""}
+        runs |= {*map(show, dict(zip(grid.header, grid.columns, strict=True)).get("run", ()))}
     zero = len(runs) > 2 and all(_DECIMAL.fullmatch(cell) and float(cell) == 0 for cell in cells)
     if not (zero or cells <= _BLANK) or all(k is None for k in places):
         return grids, []
@@ -211,24 +210,26 @@ def without_phases(grids: Sequence[Grid]) -> tuple[Sequence[Grid], list[str]]:
     for grid, k in zip(grids, places, strict=True):
         keep = [j for j in range(len(grid.header)) if j != k and not grid.header[j].startswith("phase_std")]
         named = tuple(tuple(names[j] for j in keep) for names in grid.named)
-        rows = tuple((number, tuple(row[j] for j in keep)) for number, row in grid.rows)
-        cut.append(replace(grid, header=tuple(grid.header[j] for j in keep), rows=rows, named=named))
+        header, columns = zip(*((grid.header[j], grid.columns[j]) for j in keep), strict=True)
+        cut.append(replace(grid, header=header, columns=columns, named=named))
     words = "all phases are 0: they are taken as not known, and the amplitudes alone are used"
     return cut, [words] if zero else []
 
 
 def joined(grids: Sequence[Grid], problems: Problems) -> list[Grid]:
     """One runs table of several, with the columns of the first, or none and problems."""
-    first, rows = grids[0], list[Row]()
+    first = grids[0]
     for grid in grids:
         if {*grid.header} != {*first.header}:
             expected = f"the columns {listing(first.header, 'and')}, as {first.source} has"
             problems.add(expected, grid.source, grid.header_row, None, listing(grid.header, "and"))
             return []
-        places = [grid.header.index(name) for name in first.header]
-        rows += [(number, tuple(cells[k] for k in places)) for number, cells in grid.rows]
     source = listing([grid.source for grid in grids], "and")
-    return [replace(first, source=source, rows=tuple(rows), named=())]
+    numbers = tuple(chain.from_iterable(grid.numbers for grid in grids))
+    columns = [
+        [cell for grid in grids for cell in grid.columns[grid.header.index(name)]] for name in first.header
+    ]
+    return [replace(first, source=source, numbers=numbers, columns=columns, named=())]
 
 
 def long_rows(
@@ -260,7 +261,7 @@ def long_rows(
     columns = [column for h in headings for column in _columns(grid, h, headings, pair, conventions)]
     sensors = _by_name(grid, columns, pair, key)
     common = [column for column in columns if column.stem not in pair]
-    stems, n, run = {column.stem for column in common}, len(grid.rows), run or conventions.run
+    stems, n, run = {column.stem for column in common}, len(grid.numbers), run or conventions.run
     if run and "run" not in stems:
         common.insert(0, _Column(Heading(0, "run"), "run", "", [run] * n))
     if key == "sensor" and "speed" not in stems and conventions.speed is not None:
@@ -284,17 +285,24 @@ def long_rows(
     for column, k in ((column, k) for group in groups for k, column in enumerate(group)):
         if column.name(k) != header[k]:
             raise _unclear(grid, column, f"the unit of all {key}s, {header[k]}")
-    rows = zip(*(zip(*(column.cells for column in group), strict=True) for group in groups), strict=True)
-    long = [(number, cells) for (number, _), each in zip(grid.rows, rows, strict=True) for cells in each]
-    taken = [tuple(column.heading.name for column in group) for group in groups]
-    return replace(grid, header=tuple(header), rows=tuple(long), named=tuple(taken) * n)
+    cells, *more = [[column.cells for column in group] for group in groups]
+    if more:
+        each = zip(cells, *more, strict=True)
+        cells = [[*chain.from_iterable(zip(*parts, strict=True))] for parts in each]
+    return replace(
+        grid,
+        header=tuple(header),
+        numbers=tuple(number for number in grid.numbers for _ in groups),
+        columns=cells,
+        named=tuple(tuple(column.heading.name for column in group) for group in groups) * n,
+    )
 
 
 def _columns(
     grid: Grid, heading: Heading, headings: Sequence[Heading], pair: tuple[str, str], conventions: Conventions
 ) -> list[_Column]:
     """A column of the file, as one of amplitudes and one of phases where its cells hold both."""
-    stem, cells = heading.stem, [cells[heading.index] for _, cells in grid.rows]
+    stem, cells = heading.stem, grid.columns[heading.index]
     column = _Column(heading, stem, heading.unit, cells)
     if stem.endswith("X"):
         other = "delete the column, or begin its name with note (if it is a probe: with P)"
@@ -370,7 +378,7 @@ def _one_unit(grid: Grid, column: _Column, conventions: Conventions) -> tuple[st
             stated.setdefault(name, at)
     if len(stated) > 1:
         (one, first), (_, other) = [*stated.items()][:2]
-        place = "the heading" if first is None else f"row {grid.rows[cells.index(first)][0]}"
+        place = "the heading" if first is None else f"row {grid.numbers[[*cells].index(first)]}"
         words = f"a number {f'in {one}' if one else 'without a unit'}, as {place} says"
         raise _unclear(grid, column, words, other)
     return next(iter(stated), ""), [numbers.get(cell, cell) for cell in cells] if numbers else cells

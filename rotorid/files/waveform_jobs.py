@@ -159,7 +159,7 @@ def read_waveforms(files: Sequence[str | Path], stated: Mapping[str, object] | N
     problems, paths = Problems(), [*map(Path, files)]
     settings = next((path for path in paths if path.suffix.lower() == ".toml"), None)
     source, folder = str(settings or "the options"), (settings or Path()).parent
-    data: dict[str, Any] = {"records": {path.stem: str(path) for path in paths}}
+    data = {"records": {path.stem: str(path) for path in paths}}
     if settings is not None:
         data = read_toml(settings)
     if len(paths) > (1 if settings else len(data["records"])):
@@ -355,6 +355,6 @@ def read_vectors_grid(
         for word in one.warnings:
             warnings.warn(f"{path}: run {one.run!r}: {word}", TableWarning, stacklevel=2)
     table = vectors_table(each, labels)
-    rows = (tuple("" if value is None else value for value in row) for row in table.rows)
-    grid = Grid(str(path), 1, tuple(table.headings), tuple(enumerate(rows, start=2)))
+    columns = [["" if x is None else x for x in column.values] for column in table.columns]
+    grid = Grid(str(path), 1, tuple(table.headings), tuple(range(2, len(columns[0]) + 2)), columns)
     return grid, labels.phase, waveforms.files

@@ -12,6 +12,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import compress
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from rotorid.base.arrays import ComplexArray, FloatArray
 from rotorid.base.choices import did_you_mean
 from rotorid.base.text import listing
 from rotorid.files import units
-from rotorid.files.cells import Grid, NotANumber, Row, parse_number, show
+from rotorid.files.cells import Grid, NotANumber, parse_number, show
 from rotorid.files.columns import FULL_TURN, UNCLEAR, Column, Source, Table, make_table, read_grid
 from rotorid.files.headings import WEIGHT, find_header, read_headings
 from rotorid.files.input_problems import InputError, Problems
@@ -152,15 +153,21 @@ def _one_weight_a_row(grid: Grid, conventions: Conventions) -> Grid:
     at = {heading.stem: heading.index for heading in headings}
     wide = "plane" not in at and len({h.sensor for h in headings if h.sensor and h.stem in WEIGHT}) > 1
     if {"unit", "mass"} <= at.keys():
-        k, unit = at["mass"], at["unit"]
-        rows = ((n, (*r[:k], f"{show(r[k])} {show(r[unit])}".strip(), *r[k + 1 :])) for n, r in grid.rows)
-        grid = replace(grid, rows=tuple(rows))
+        k, unit, columns = at["mass"], at["unit"], grid.columns
+        each = zip(columns[k], columns[unit], strict=True)
+        masses = [" ".join(map(show, cells)).strip() for cells in each]
+        grid = replace(grid, columns=(*columns[:k], masses, *columns[k + 1 :]))
     headings = headings if wide else [replace(heading, sensor="") for heading in headings]
     grid = long_rows(grid, headings, WEIGHT, "plane", conventions)
     filled = ("mass", *_PLACES, *(() if wide else ("plane",)))
     places = [k for k, name in enumerate(grid.header) if name.partition("_")[0] in filled]
-    kept = [k for k, (_, row) in enumerate(grid.rows) if any(show(row[place]) for place in places)]
-    return replace(grid, rows=tuple(grid.rows[k] for k in kept), named=tuple(grid.named[k] for k in kept))
+    kept = [any(map(show, cells)) for cells in zip(*(grid.columns[k] for k in places), strict=True)]
+    return replace(
+        grid,
+        numbers=tuple(compress(grid.numbers, kept)),
+        columns=[[*compress(column, kept)] for column in grid.columns],
+        named=tuple(compress(grid.named, kept)),
+    )
 
 
 def _angles(table: Table, conventions: Conventions) -> FloatArray:
@@ -214,16 +221,16 @@ def _by_name(table: Table, i: int, stem: str, conventions: Conventions) -> float
 
 def _without_marks(grid: Grid) -> tuple[Grid, _Unknown]:
     """A weights table with numbers in place of `?`, and where these stood."""
-    columns = [h for h in read_headings(grid.header, weights=True) if h.stem in WEIGHT]
-    rows, unknown = list[Row](), _Unknown()
-    for number, cells in grid.rows:
-        new = list(cells)
-        for heading in columns:
-            if show(cells[heading.index]) == "?":
-                unknown.add((number, heading.sensor, heading.stem))
-                new[heading.index] = "1" if heading.stem == "mass" else "0"
-        rows.append((number, tuple(new)))
-    return replace(grid, rows=tuple(rows)), unknown
+    headings = [h for h in read_headings(grid.header, weights=True) if h.stem in WEIGHT]
+    columns, unknown = [*grid.columns], _Unknown()
+    for heading in headings:
+        cells = [*columns[heading.index]]
+        for k, cell in enumerate(cells):
+            if show(cell) == "?":
+                unknown.add((grid.numbers[k], heading.sensor, heading.stem))
+                cells[k] = "1" if heading.stem == "mass" else "0"
+        columns[heading.index] = cells
+    return replace(grid, columns=columns), unknown
 
 
 def _relative_weights(

@@ -118,7 +118,7 @@ def inverse_roots(
         )
     thin = (THIN**2 * high - low).clip(0)  # without a step: digits often differ by a hundredth
     turned = turned + thin[..., None, None] * np.eye(2)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(turned)) @ turn)
+    return np.linalg.inv(np.linalg.cholesky(turned)) @ turn
 
 
 def trusted(predicted: ComplexArray, measured: ComplexArray) -> ComplexArray:
@@ -172,7 +172,7 @@ class Experiments:
     def __post_init__(self) -> None:
         if not (n := len(self.names)):
             raise ValueError("there are no experiments")
-        parts: list[tuple[tuple[int, ...], Mapping[str, AnyArray]]] = [
+        parts = [
             ((n,), {"frequencies": self.frequencies, **self.signals}),
             ((n, 2, 2), self.covariances),
         ]
@@ -344,6 +344,7 @@ class Comparison:
         gap[..., 0] -= self.measured
         frequency[:, 0] -= self.experiments.frequencies
         both = self.whiten @ np.stack((gap.real, gap.imag), axis=-2)
+        del gap
         for i in self.free:
             over, shape, rows = self.whiten[i, :, 0, 0], self.measured[i].real, self.rows[i, :, 0]
             reference, std = reference_amplitude(shape), self.experiments.frequency_std
@@ -370,7 +371,7 @@ def compare(model: HarmonicModel, experiments: Experiments) -> Comparison:
     """
     model.check_square()
     measured, inputs = experiments.table(model.outputs), experiments.table(model.inputs)
-    given = np.asarray(~np.isnan(measured))
+    given = ~np.isnan(measured)
     factors = model.multipliers(experiments.frequencies, experiments.varying)
     excited = ~np.isnan(inputs).any(axis=1) & ~np.isnan(factors).any(axis=1) | experiments.free
     usable = excited & given.any(axis=1)

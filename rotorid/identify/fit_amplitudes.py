@@ -31,7 +31,7 @@ from rotorid.identify.operator_model import HarmonicModel
 from rotorid.identify.result import Identification
 from rotorid.identify.starting_values import starting_values
 from rotorid.regression.estimate import Combination, Estimate, only_determined
-from rotorid.regression.linear import normal_matrix
+from rotorid.regression.linear import NormalMatrix, normal_matrix
 from rotorid.regression.nonlinear import (
     LOSSES,
     NonlinearEstimate,
@@ -48,8 +48,8 @@ WITHIN = 1e-6
 LARGE = 0.12
 """Readings are rarely wrong by more than this share: a model that leaves more of them is doubted."""
 Bounds = Mapping[str, tuple[float | None, float | None]]
-OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, FloatArray]
-"""A fit, the comparison with the last weights, what a prior did, and the last derivatives."""
+OutputError = tuple[NonlinearEstimate, Comparison, PriorEffect | None, NormalMatrix]
+"""A fit, the comparison with the last weights, what a prior did, and the last normal matrix."""
 
 
 def identify(
@@ -130,16 +130,20 @@ def _check(
 
 
 def _identified(
-    model: HarmonicModel, data: Experiments, start: Mapping[str, float], how: Mapping[str, Any]
+    model: HarmonicModel,
+    data: Experiments,
+    start: Mapping[str, float],
+    how: Mapping[str, Any],
+    linear: LinearFit | None = None,
 ) -> Identification:
     """By output error, or linear regression alone where the model cannot predict."""
-    linear, problem, fits = None, ValueError(), list[OutputError]()
+    problem, fits = ValueError(), list[OutputError]()
     try:
-        rows = build_rows(model, data)
+        rows = linear.rows if linear else build_rows(model, data)
     except ValueError as error:  # an amplitude that it needs is missing
         problem = error
     else:
-        linear = linear_fit(model, rows)
+        linear = linear or linear_fit(model, rows)
     predicts = len(model.outputs) == len(model.equations)
     hidden = {name for name in model.signals if np.isnan(data.table([name])).all()}
     if linear is None and (not predicts or hidden.intersection(model.inputs) or hidden >= {*model.outputs}):
@@ -205,7 +209,7 @@ def output_error(
     did = effect(added, J, fit.estimate.residuals, point, at_bounds=fit.at_bounds)
     estimate = did.apart(fit.estimate) if did else fit.estimate
     message = f"converged in {counted(iterations, 'iteration')}" if fit.converged else fit.message
-    return replace(fit, estimate=estimate, message=message), comparison, did, J
+    return replace(fit, estimate=estimate, message=message), comparison, did, normal_matrix(names, J)
 
 
 def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, whole: bool) -> Identification:
@@ -220,7 +224,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
         near = any(np.allclose(here, other[0].estimate.solution, rtol=SAME, atol=0) for other in chosen)
         if one[0].estimate.full_rank and not near:
             chosen.append(one)
-    fit, comparison, prior, J = chosen[0]
+    fit, comparison, prior, matrix = chosen[0]
     model, data, converged = comparison.model, comparison.experiments, fit.converged
     estimate, theta, points = fit.estimate, fit.estimate.solution, [one.values for one, *_ in chosen]
     apart = several(points) & ~np.isnan(points).any(axis=0)
@@ -257,7 +261,7 @@ def _by_output_error(fits: Sequence[OutputError], linear: LinearFit | None, *, w
         converged=converged,
         warnings=tuple(warnings),
         notes=(fit.message,),
-        normal_matrix=normal_matrix(model.parameters, J),
+        normal_matrix=matrix,
         prior=prior,
     )
 
@@ -302,7 +306,7 @@ def _by_digits(answer: Identification, how: Mapping[str, Any]) -> Identification
     std = np.sqrt(data.rounding[""]) if data.free.any() else None
     stated = replace(data, covariances=spread, frequency_std=std)
     try:
-        answer = _identified(answer.model, stated, _named(answer.model, answer.theta), how)
+        answer = _identified(answer.model, stated, _named(answer.model, answer.theta), how, answer.linear)
     except (ValueError, np.linalg.LinAlgError):
         return without
     chi_square, dof = answer.estimate.chi_square or 0.0, answer.dof

@@ -145,7 +145,7 @@ def fit(  # noqa: PLR0913
     words = [*judged.pop("warnings"), more, *_rivals(paths, path)]
     if ((theta < low) | (theta > high)).any():
         words.append(f"{method} knows no bounds, and the result lies outside those of the model")
-    runs = problem.runs if np.isfinite(problem.residual(theta)).all() else ()
+    runs = problem.solutions(theta) if np.isfinite(problem.residual(theta)).all() else ()
     return Fit(
         **(vars(path) | judged),
         models=problem.models,

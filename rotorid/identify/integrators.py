@@ -170,7 +170,7 @@ def heun_step(
         Places in z.
     """
     k = rate(now, z)
-    new: FloatArray = z + h * k
+    new = z + h * k
     for part in parts:
         new[part] = (z + h / 2 * (k + rate(then, new)))[part]
     return new

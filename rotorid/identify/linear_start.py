@@ -346,7 +346,7 @@ def _weights(system: System) -> FloatArray:
         return np.diag(1.0 / np.where(system.values != 0, np.abs(system.values), 1.0))
     scale = np.maximum(np.sqrt(np.diag(system.covariance)), 1e-14 * np.abs(system.values) + 1e-100)
     shares = system.covariance / np.outer(scale, scale) + 1e-12 * np.eye(len(scale))
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(shares)) / scale)
+    return np.linalg.inv(np.linalg.cholesky(shares)) / scale
 
 
 def _refined(system: System, theta: FloatArray, free: list[int], weight: FloatArray) -> FloatArray:

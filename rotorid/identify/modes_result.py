@@ -182,7 +182,7 @@ class FittedModes:
     def curve(self, omega: FloatArray) -> ComplexArray:
         """The fitted amplitudes at frequencies between the readings, (m,): (m, P)."""
         q = self.fit.estimate.solution
-        return np.asarray(self.answers.at(omega).basis(q)[0] @ self._linear(q)[0].T)
+        return self.answers.at(omega).basis(q)[0] @ self._linear(q)[0].T
 
     def predicted(self, columns: Callable[[FloatArray], ComplexArray]) -> tuple[ComplexArray, FloatArray]:
         """Sums of R, a and b, weighted by columns (m, k + 2) of q: (m, P), and covariances of their parts.
@@ -192,7 +192,7 @@ class FittedModes:
         q, covariance = self.fit.estimate.solution, self.fit.estimate.covariance
 
         def sums(q: FloatArray) -> ComplexArray:
-            return np.asarray(columns(q) @ self._linear(q)[0].T)
+            return columns(q) @ self._linear(q)[0].T
 
         steps = 1e-6 * np.diag(np.maximum(np.abs(q), 1e-4))
         slopes = np.stack([(sums(q + d) - sums(q - d)) / (2 * d.sum()) for d in steps], axis=-1)

@@ -278,7 +278,7 @@ def ode_model(
     check_known("per_record", per_record, "parameter", estimate)
     begin, known = ({n: expressions.finite(n, x) for n, x in each.items()} for each in (estimate, known))
     names = ["t", *states, *estimate, *inputs]
-    texts: dict[str, str] = {}
+    texts = {}
 
     def read(kind: str, given: Mapping[str, float | str], allowed: Collection[str]) -> tuple[Expression, ...]:
         """Expressions of the states or outputs."""

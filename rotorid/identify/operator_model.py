@@ -154,7 +154,7 @@ class HarmonicModel:
             Known quantities (n,) that change from row to row, by name.
         """
         terms = self.multipliers(frequencies, varying) * self.polynomials(values)[0]
-        return np.asarray(np.tensordot(terms, self._place, 1))
+        return np.tensordot(terms, self._place, 1)
 
     def predict(
         self,
@@ -207,7 +207,7 @@ class HarmonicModel:
         Z = np.linalg.solve(A, -(B @ given[:, :, None]))[:, :, 0]
         load = multipliers * np.column_stack((Z, given))[:, self.column]
         G = (load[:, None] * np.eye(e)[self.equation].T) @ dP
-        return np.asarray(Z), np.asarray(np.linalg.solve(A, -G))
+        return Z, np.linalg.solve(A, -G)
 
     def dynamic_stiffness(
         self, values: FloatArray, varying: Mapping[str, FloatArray] | None = None
@@ -264,7 +264,7 @@ def eigenvalues(A: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     L[-e:], R[-e:, -e:] = -np.hstack([*scaled[:-1]]), scaled[-1]
     with np.errstate(divide="ignore", invalid="ignore"):
         z, y = eig(L, R)
-    return np.asarray(z * unit), np.asarray(y)
+    return z * unit, np.asarray(y)
 
 
 def natural_modes(A: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -302,7 +302,7 @@ def nearest_mode(
     mac = np.divide((u @ w) ** 2, size, out=np.zeros_like(z), where=size > 0)
     away = np.abs(np.log(np.sqrt(z) / frequency))
     best = int(np.argmin(np.where(mac >= mac.max() - 0.02, away, np.inf)))
-    return float(z[best]), np.asarray(v[:, best])
+    return float(z[best]), v[:, best]
 
 
 def mode_slopes(

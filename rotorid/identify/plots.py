@@ -142,7 +142,7 @@ def bode_plot(sweep: Readings, roll: ComplexArray, fit: FittedModes | None) -> F
     above, below = axes = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     order = np.argsort(sweep.speeds, kind="stable")
     omega = sweep.speeds[order]
-    dots: dict[str, Any] = {"label": "fit", "color": "black", "lw": 0.9, "ls": ":", "zorder": 3}
+    dots = {"label": "fit", "color": "black", "lw": 0.9, "ls": ":", "zorder": 3}
     fits = [] if fit is None else [(fit.curve(omega), dots)]
     for c, name in enumerate(sweep.sensors[:CURVES]):
         for Z, style in ((sweep.vectors[order], {"lw": 1.6, "label": name, **look(c)}), *fits):

@@ -118,7 +118,7 @@ def draw_parameters(result: Fit, axes: Axes) -> None:
 def _styles(result: Fit, k: int) -> tuple[dict[str, Any], dict[str, Any]]:
     """Points and line of a record; points of a single one are grey, and the line of one sample is a dash."""
     several, count = len(result.records) > 1, len(result.records[k])
-    line: dict[str, Any] = look(k) if several else {"color": BLUE}
+    line = look(k) if several else {"color": BLUE}
     marks = {
         "linestyle": "",
         "marker": MARKERS[k % len(MARKERS)],

@@ -111,7 +111,7 @@ def linear_solutions(
         return np.concatenate([A, table[..., :1] - A @ x[..., None], B], axis=-1)
 
     def rate(table: FloatArray, z: FloatArray) -> FloatArray:
-        rates: FloatArray = table[..., :n] @ z
+        rates = table[..., :n] @ z
         rates[..., n:] += table[..., n:]
         return rates
 

@@ -122,7 +122,8 @@ class Problem:
                 f"no sum of squares can be made of samples over σ of {most:.3g}: take other units"
             )
         self.runs: tuple[Trajectory, ...] = ()
-        """Of the last evaluation, one per record."""
+        self._at = b""
+        """Solutions of the last simulation, one per record, and its parameters."""
         self._latest = lru_cache(maxsize=2)(self._evaluated)
 
     def vector(self, tables: Sequence[FloatArray]) -> FloatArray:
@@ -144,19 +145,26 @@ class Problem:
         SimulationError
             The states diverge.
         """
-        r, J, self.runs = self._latest(theta.tobytes())
-        return r, J
+        return self._latest(theta.tobytes())
 
-    def _evaluated(self, values: bytes) -> tuple[FloatArray, FloatArray, tuple[Trajectory, ...]]:
-        """What `evaluate` gives, and the solutions: a search comes back to parameters it has seen."""
+    def solutions(self, theta: FloatArray) -> tuple[Trajectory, ...]:
+        """Of the models at parameters that can be evaluated, one per record."""
+        if self._at != theta.tobytes():
+            self._evaluated(theta.tobytes())
+        return self.runs
+
+    def _evaluated(self, values: bytes) -> tuple[FloatArray, FloatArray]:
+        """What `evaluate` gives: a search comes back to parameters it has seen."""
         theta = np.frombuffer(values)
         if not np.isfinite(theta).all():
             raise SimulationError("the parameters grow beyond all bounds")
+        # solutions take three times as much as what is kept of them
+        first, self._at, self.runs = not self._at, self._at and b"?", ()
         runs = tuple(
             simulate(model, theta, record, integrator=self.integrator, rtol=self.rtol)
             for model, record in zip(self.models, self.records, strict=True)
         )
-        first = not self.runs and self.integrator == "auto" and len({*self.models}) == 1
+        first = first and self.integrator == "auto" and len({*self.models}) == 1
         if first and worth_compiling(self.model, sum(run.calls for run in runs)):
             self.integrator = "taylor"
             return self._evaluated(values)
@@ -164,7 +172,8 @@ class Problem:
         J = self.vector([run.y_theta for run in runs])
         if not (np.abs(r).max() < LARGEST and np.abs(J).max() < LARGEST):
             raise SimulationError("the outputs of the model, or their sensitivities, are beyond all bounds")
-        return r, J, runs
+        self._at, self.runs = values, runs
+        return r, J
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (m,); infinite where the states diverge, so that a search steps back."""

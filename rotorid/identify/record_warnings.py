@@ -26,7 +26,7 @@ from rotorid.identify.record_least_squares import Iterations, Problem
 from rotorid.identify.records import inputs_of
 from rotorid.identify.simulation import STEPWISE
 from rotorid.regression import gain, least_squares
-from rotorid.regression.estimate import Combination, Estimate
+from rotorid.regression.estimate import Estimate
 from rotorid.regression.linear import JACOBIAN_RCOND, normal_matrix
 from rotorid.regression.prior import effect
 
@@ -55,7 +55,7 @@ def judge(problem: Problem, path: Iterations, loss: str) -> dict[str, Any]:
         r, J = estimate.residuals, problem.jacobian(theta)
     except SimulationError as error:
         words.append(f"the model cannot be simulated with the result: {error}")
-        nothing: dict[str, Any] = dict.fromkeys(("autocorrelation", "prior", "normal_matrix", "poor"))
+        nothing = dict.fromkeys(("autocorrelation", "prior", "normal_matrix", "poor"))
         return nothing | {"estimate": _widened(estimate, None), "reliable": False, "warnings": words}
     prior = effect(problem.prior, J, r, theta, at_bounds=path.at_bounds)
     if prior is not None:
@@ -259,7 +259,7 @@ def combined(problem: Problem, estimate: Estimate) -> Estimate:
     scale = np.where(theta == 0, 1.0, np.abs(theta))
     null = np.linalg.svd(estimate.row_space * scale)[2][rank:]
     rows = [scale * (names == name) for name in names if name not in estimate.undetermined]
-    chosen: list[Combination] = []
+    chosen = []
     by = problem.model.symbols[1 + len(problem.model.states) :][: len(theta)]
     for expression in _coefficients(problem.model, by):
         if len(rows) == rank:
@@ -283,7 +283,7 @@ def _coefficients(model: OdeModel, parameters: list[Any]) -> Iterator[Any]:
     import sympy
 
     varying = {*model.symbols} - {*parameters}
-    parts: set[Any] = set()
+    parts = set()
     for expression in (*model.rates, *model.observed, *model.initial, *model.inertia):
         expanded = sympy.expand(expression)
         powers = [e for e in expanded.atoms(sympy.Function, sympy.Pow) if e.free_symbols & varying]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -111,23 +110,29 @@ class Identification(Answered, Uncertain):
         """Whether errors are stated: intervals are normal ones, else Student's t of what the model leaves."""
         return self.estimate.errors_stated
 
-    @cached_property
-    def residuals(self) -> tuple[Column, ...]:
-        """Measured less predicted, as a share of the size, of each output; else of each equation.
+    @property
+    def left(self) -> ComplexArray:
+        """Measured less predicted, as a share of the size, (n, outputs); else (n, equations).
 
-        A row an experiment and output; NaN where left out.
+        NaN where left out.
         """
         if self.predicted or self.linear is None:
-            measured, rows_of = self.experiments.table(self.model.outputs), list(self.model.outputs)
+            measured = self.experiments.table(self.model.outputs)
             with np.errstate(divide="ignore", invalid="ignore"):
-                left = (measured - np.transpose([*self.predicted.values()])) / np.abs(measured)
+                left: ComplexArray = (measured - np.transpose([*self.predicted.values()])) / np.abs(measured)
             left[~np.isfinite(left)] = np.nan
-        else:
-            parts = np.full(self.linear.rows.used.shape, np.nan)
-            parts[self.linear.rows.used] = self.linear.estimate.residuals
-            left = parts[:, ::2] + 1j * parts[:, 1::2]
-            rows_of = [f"equation {e + 1}" for e in range(left.shape[1])]
+            return left
+        parts = np.full(self.linear.rows.used.shape, np.nan)
+        parts[self.linear.rows.used] = self.linear.estimate.residuals
+        return parts[:, ::2] + 1j * parts[:, 1::2]
+
+    @property
+    def residuals(self) -> tuple[Column, ...]:
+        """What is `left` of each experiment and output, or equation, in a row."""
+        left = self.left
         n, e = left.shape
+        equations = [f"equation {k + 1}" for k in range(e)]
+        rows_of = [*self.model.outputs] if self.predicted or self.linear is None else equations
         return (
             Column("experiment", np.repeat(self.experiments.names, e)),
             Column(
@@ -141,7 +146,8 @@ class Identification(Answered, Uncertain):
     @property
     def residual_rms(self) -> float:
         """Over the real rows used; NaN where there are none."""
-        parts = np.array([column.values for column in self.residuals[3:]], dtype=float)
+        left = self.left
+        parts = np.stack((left.real, left.imag))
         return float(np.sqrt(np.nanmean(parts**2))) if np.isfinite(parts).any() else np.nan
 
     def value(self, name: str) -> float:
@@ -215,6 +221,6 @@ class Identification(Answered, Uncertain):
             "\n".join(lines),
             self.warnings[::-1],  # what speaks against the answer comes last there
             (*notes, *self.notes),
-            (text(self.residuals), self.normal_matrix.text()),
+            (lambda: text(self.residuals), self.normal_matrix.text()),
             "what it leaves of each reading, the normal matrix",
         )

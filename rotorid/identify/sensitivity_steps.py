@@ -57,7 +57,7 @@ def iterate(
     widths = [np.diff(record.t, prepend=record.t[0]) for record in problem.records]
     # the squares of residuals in the units of the outputs, each times the step before it
     width = problem.by_time(widths) / problem.scale**2
-    history: list[FloatArray] = []
+    history = []
     costs, integrals = [], []
     converged, message, by, last = False, f"not converged in {counted(most, 'iteration')}", None, None
     try:

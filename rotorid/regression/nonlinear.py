@@ -180,7 +180,7 @@ def nonlinear_least_squares(  # noqa: PLR0913
             estimate,
             covariance=covariance,
             solution_covariance=of_solution,
-            residuals=estimate.residuals[:rows],
+            residuals=estimate.residuals[:rows].copy(),  # not with the slopes that they stand beside
         ),
         history=np.array(path),
         costs=np.array(costs),

@@ -53,7 +53,7 @@ class Prior:
 
     def residual(self, theta: FloatArray) -> FloatArray:
         """Residuals (p,) at the parameters (n,)."""
-        return np.asarray((theta[self.place] - self.value) / self.std)
+        return (theta[self.place] - self.value) / self.std
 
     def below(self, K: FloatArray) -> FloatArray:
         """Derivatives (m, n) of the data, and those of these rows below them."""

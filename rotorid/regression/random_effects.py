@@ -89,7 +89,7 @@ def shrunk(off: FloatArray, dof: int) -> FloatArray:
     variance = N / dof**3 * np.sum(other * ((x**2).T @ x**2 - (x.T @ x) ** 2 / N))
     total = float(np.sum(other * (x.T @ x / dof) ** 2))
     share = 1.0 if N < 3 or not total else float(np.clip(variance / total, 0.0, 1.0))
-    return np.asarray(scatter * (1.0 - share * other))
+    return scatter * (1.0 - share * other)
 
 
 def _without(scatter: FloatArray, error: FloatArray) -> FloatArray:
@@ -99,7 +99,7 @@ def _without(scatter: FloatArray, error: FloatArray) -> FloatArray:
     is left would make what it has in common with others, and with it their variance, as large as one likes.
     """
     root = covariance_root(scatter - error, np.diag(scatter))
-    return np.asarray(root @ root.T)
+    return root @ root.T
 
 
 def oddness(y: FloatArray, error: FloatArray, group: IntArray) -> tuple[FloatArray, float]:

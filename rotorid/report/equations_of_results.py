@@ -159,7 +159,7 @@ def _linear_about_last(result: Fit) -> Equations:
     if model.inertia:
         raise ValueError("--show equations of quasilinearization needs a model that states its rates itself")
     rates, _, _ = _as_written(model)
-    rows: list[Row] = []
+    rows = []
     for i, f in enumerate(rates):
         for name, by in [*(("f_x", by) for by in x), *(("f_θ", by) for by in thetas)]:
             rows.append(Row(name, [(1, Symbol(f"∂f{i + 1}/∂{by}"))], [(usual(f.diff(by)), 1)]))

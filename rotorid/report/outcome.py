@@ -76,7 +76,7 @@ class Outcome(Answered):
     keys: Mapping[str, Any] | Callable[[], Mapping[str, Any]] = dataclasses.field(default_factory=dict)
     provenance: Mapping[str, Any] = dataclasses.field(default_factory=dict)
     tables: tuple[Table | str, ...] = ()
-    more: tuple[Table | str, ...] = ()
+    more: tuple[Table | str | Callable[[], str], ...] = ()
     beyond: str = ""
     short: bool = False
     to_mount: bool = False

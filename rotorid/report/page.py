@@ -80,10 +80,11 @@ def render_report(
     return text.encode("utf-8", "replace")  # names of files may be anything
 
 
-def block(table: Table | str, longest: int = LONG) -> Markup:
+def block(table: Table | str | Callable[[], str], longest: int = LONG) -> Markup:
     """A table, those too wide in parts that repeat its first two columns; or text as it stands."""
     from markupsafe import Markup
 
+    table = table() if callable(table) else table
     if isinstance(table, str):
         return Markup("<pre>{}</pre>").format(table)
     first, others, step = table.columns[:2], table.columns[2:], ABREAST - 2

@@ -143,7 +143,7 @@ def shown(path: Path, key: str, grid: Grid) -> Table:
     columns than those that the page writes is not edited.
     """
     table, times = Table(path, grid.header), Counter[str]()
-    for number, row in grid.rows:
+    for number, *row in zip(grid.numbers, *grid.columns, strict=True):
         cells = {name: getattr(cell, "text", show(cell)) for name, cell in zip(grid.header, row, strict=True)}
         place = "|".join(cells[name] for name in cells if content(name) in ("run", "speed", "sensor"))
         times[place] += 1

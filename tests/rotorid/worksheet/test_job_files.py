@@ -94,7 +94,7 @@ def test_an_edit_changes_its_row_alone(tmp_path, parts, typed, column):
     after = (tmp_path / "runs.csv").read_bytes().decode("utf-8-sig").split(end)
     assert [*after[:2], *after[3:]] == [*lines[:2], *lines[3:]]
     grid = read_grid(tmp_path / "runs.csv", "runs", Problems(), may_be_empty=True)
-    assert [[getattr(c, "text", c) for c in row] for _, row in grid.rows] == held
+    assert [[getattr(c, "text", c) for c in row] for row in zip(*grid.columns, strict=True)] == held
     assert [row["cells"] for row in rows(JobFiles(tmp_path))] == held
     if (tmp_path / "runs.csv").read_bytes() != before:
         job.undo()
