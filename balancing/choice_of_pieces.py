@@ -126,7 +126,7 @@ class Mounted(Answered):
             first = "These pieces would leave"
         if c.errors_known:
             most = figures(self.check_rms * labels.vibration_scale, 2)
-            left += f"; a check run stays below {most} in at least 95 of 100"
+            left += f"; a check run stays below {most} in ≥ 95 of 100"
         run = self.on_top_of
         stays = (
             "with all trial weights taken off" if run is None else f"beside what is mounted in run {run!r}"

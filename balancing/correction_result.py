@@ -319,10 +319,10 @@ class Correction(Prediction, Answered):
         checked = figures(self.check_rms * scale, 2) if self.errors_known else ""
         exact = new <= INVISIBLE * old
         if checked and exact:
-            return " ".join(f"{before} → below {checked} {unit} in at least 95 of 100 check runs".split())
+            return " ".join(f"{before} → below {checked} {unit} in ≥ 95 of 100 check runs".split())
         left = "0 by arithmetic," if exact else small(rms(self.after) * scale, old * scale)
         words = f"{before} → {left} {unit}".rstrip(" ,")
-        return f"{words}; a check run stays below {checked} in at least 95 of 100" if checked else words
+        return f"{words}; a check run stays below {checked} in ≥ 95 of 100" if checked else words
 
     def in_words(self) -> str:
         """Weights and their 95 %, in a line."""

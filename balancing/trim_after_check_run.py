@@ -164,7 +164,7 @@ def after_check_run(
     after, bound = rms(made.after[pick]), made.check_rms if c.errors_known else None
     change = rms_change(labels, check.mean[-1], made.after[pick])
     if bound is not None:
-        change += f", below {figures(bound * labels.vibration_scale, 2)} in at least 95 of 100 check runs"
+        change += f", below {figures(bound * labels.vibration_scale, 2)} in ≥ 95 of 100 check runs"
         change += ", and it may get worse" * (judged == "fail" and bound > now)
     left = after if bound is None or judged == "fail" else bound
     worth = trim.any() and left < WORTH * now

@@ -106,7 +106,7 @@ class WhatIf(Outlook, Answered):
         left, bound = f"{three_figures(old)} → {small(rms(self.after) * scale, old)}", " (errors unknown)"
         if self.errors_known:
             left += f" ± {figures(self.rms_within * scale, 2)}"
-            bound = f", below {three_figures(self.check_rms * scale)} in at least 95 of 100 check runs"
+            bound = f", below {three_figures(self.check_rms * scale)} in ≥ 95 of 100 check runs"
         each = self.work_words(self.planes, self.weights)
         first = f"{capital(self.word)} on the bare rotor: rms {left} {unit}".rstrip() + f"{bound}."
         on = f"On the bare rotor: {'; '.join(each) or 'nothing'}; {labels.turning_in_words()}."

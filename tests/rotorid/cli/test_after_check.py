@@ -54,7 +54,7 @@ def test_pieces_have_their_own_expectation(cli):
     assert cli("balance", job, "--split", "--table").out.count("Largest left") == 1
     found = cli("balance", job, "--split", "--json").json
     bound = found["mounting"]["rms_after_95"]
-    assert f"below {bound:.2g} in at least 95 of 100" in split.out
+    assert f"below {bound:.2g} in ≥ 95 of 100" in split.out
     assert found["mounting"]["rms_after"] < bound
     assert found["judgement"]["rms_expected"] is None  # that of weights at any angle
 
